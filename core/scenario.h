@@ -1,0 +1,137 @@
+// Everything a run is told, in SI units. A Scenario is const while a run lasts; core/parameters.h
+// declares every key once (unit, default, range, meaning, may it change in a fork).
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace varve::core {
+
+/// "Not given: derive it" for a real parameter, until resolve() has replaced it.
+inline constexpr double automatic = std::numeric_limits<double>::quiet_NaN();
+
+enum class Precision { double_, float_, mixed };
+enum class Boundary { no_slip, free_slip, periodic, free };
+enum class PressureForm { automatic, excess, full };
+enum class Porosity { kernel, conservative };
+enum class CouplingMode { two_way, one_way, off };
+enum class Drag { stokes, schiller_naumann, dallavalle_di_felice, gidaspow, cylinder };
+enum class Kernel { wendland_c2, cubic, quintic };
+enum class GrainMotion { free, frozen };
+enum class RecordTier { deltas, digests };
+
+struct Domain {
+  std::int64_t dimension = 2;
+  double width = automatic, height = automatic;  // [m] x and y extent at the start
+  double left = 0;                       // [m] x of the left wall; moves when the width changes
+  Boundary sides = Boundary::no_slip;    // no_slip, free_slip, periodic
+  Boundary bottom = Boundary::no_slip;   // no_slip, free_slip, periodic (then top too)
+  Boundary top = Boundary::no_slip;      // no_slip, free_slip, periodic, free (free surface)
+};
+
+struct Gravity {
+  double magnitude = 9.81;  // [m/s2]
+  double tilt = 0;          // [rad] from -y towards +x
+};
+
+struct Fluid {
+  bool present = true;
+  double density = 1000;       // [kg/m3] rho0
+  double viscosity = 0.01;     // [Pa s] mu
+  double spacing = 1e-3;       // [m] dx of the first lattice
+  double level = automatic;    // [m] filling height above the bottom; the domain's height if not given
+  Kernel kernel = Kernel::wendland_c2;
+  double smoothing_ratio = 1.25;   // [-] smoothing_length / spacing
+  double sound_speed = automatic;  // [m/s] c0
+  PressureForm pressure = PressureForm::automatic;
+  double density_diffusion = 0.1;  // [-] delta of delta-SPH
+  double jitter = 0;               // [-] of the spacing
+  std::int64_t seed = 1;
+  double body_force_x = 0, body_force_y = 0;  // [m/s2]
+};
+
+struct Grains {
+  std::int64_t rows = 0, columns = 0;  // no grains if either is 0
+  double diameter = 2.5e-3;            // [m]
+  double density = 2500;               // [kg/m3]
+  double centre_x = automatic;         // [m] middle of the array; the domain's middle if not given
+  double lowest_y = automatic;         // [m] centre of the lowest row
+  double gap = 0;                      // [-] of the diameter, between neighbours
+  double jitter = 0;                   // [-] of the diameter
+  std::int64_t seed = 1;
+  double velocity_x = 0, velocity_y = 0;  // [m/s] at the start
+  GrainMotion motion = GrainMotion::free;
+};
+
+struct Contact {
+  double time = 0.5e-3;          // [s] undamped contact time with a wall, if stiffness is not given
+  double stiffness = automatic;  // [N/m per m depth in 2D] k_n
+  double damping = 0.2;          // [-] alpha: eta = alpha sqrt(m_eff k_n)
+  double friction = 0.3;         // [-] Coulomb coefficient
+  bool rotation = true;          // spin and tangential springs are part of the state
+  double tangential_ratio = automatic;  // [-] k_t / k_n: 1/3 for discs, 2/7 for spheres
+};
+
+struct Coupling {
+  CouplingMode mode = CouplingMode::two_way;
+  double length = automatic;  // [m] hc; a grain diameter if not given
+  Drag drag = Drag::dallavalle_di_felice;
+  Porosity porosity = Porosity::kernel;
+  double porosity_floor = automatic;  // [-] 0.30 in 2D, 0.25 in 3D
+  bool exclude_own_volume = true;
+};
+
+struct Time {
+  double cfl = 0.25;          // [-]
+  double dt = automatic;      // [s] resolved: fixed for the run
+  std::int64_t substeps = 0;  // grain sub-steps per step; 0: from the contact time
+  double until = automatic;   // [s]
+  std::int64_t steps = 0;     // 0: by `until`
+};
+
+struct Guards {
+  double density_deviation = 0.8;  // [-] largest |rho/rho0 - 1|
+  double overlap = 0.2;            // [-] of the diameter
+  double speed = 1.0;              // [-] of the sound speed (fluid); grains likewise
+};
+
+struct Record {
+  RecordTier tier = RecordTier::deltas;
+  std::int64_t every = 1;
+  std::int64_t keyframe_steps = 256;
+};
+
+/// A change of fork-changeable keys at the end of a given step of the run.
+struct ScheduledChange {
+  std::string name;
+  double at = automatic;     // [s]; the last step with time <= at + 1e-6 dt
+  std::int64_t at_step = -1; // resolved step
+  std::vector<std::pair<std::string, std::string>> settings;  // key, value as text
+  bool operator==(const ScheduledChange&) const = default;
+};
+
+struct Scenario {
+  std::string title;
+  Precision precision = Precision::double_;
+  Domain domain;
+  Gravity gravity;
+  Fluid fluid;
+  Grains grains;
+  Contact contact;
+  Coupling coupling;
+  Time time;
+  Guards guards;
+  Record record;
+  std::vector<ScheduledChange> changes;  // in order of at_step, then of the file
+
+  bool has_fluid() const { return fluid.present; }
+  bool has_grains() const { return grains.rows > 0 && grains.columns > 0; }
+  bool is_coupled() const {
+    return has_fluid() && has_grains() && coupling.mode != CouplingMode::off;
+  }
+};
+
+}  // namespace varve::core

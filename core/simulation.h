@@ -1,0 +1,147 @@
+// What tools see of the engine: a non-template Simulation with a field table. The dimension and the
+// precision are chosen once, in create(); nothing here names a file, a clock or a log.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "core/scenario.h"
+
+namespace varve::core {
+
+/// Raised whenever a golden digest changes; the commit says why.
+inline constexpr std::uint32_t engine_revision = 1;
+
+enum class FieldType { f64, f32, u64, u32, u8 };
+
+/// One entry of the field table: everything the next step reads and nothing that can be recomputed.
+struct FieldInfo {
+  std::string name;        ///< "fluid.velocity"
+  std::string population;  ///< "clock", "fluid", "grains", "contacts"
+  FieldType type = FieldType::f64;
+  unsigned components = 1;
+  std::string unit;
+  bool is_id = false;
+  bool constant = false;  ///< changes only where the count does
+  std::string follows;    ///< x follows v: x += dt v, in the field's own type
+};
+
+struct FieldSpan {
+  std::uint64_t count = 0;
+  std::span<const std::byte> bytes;  ///< particle-major, ascending id
+};
+
+struct ColumnInfo {
+  std::string name;
+  FieldType type = FieldType::f64;
+  std::string unit;
+};
+struct TableInfo {
+  std::string name;
+  std::vector<ColumnInfo> columns;
+};
+struct TableSpan {
+  std::uint64_t rows = 0;
+  std::vector<std::span<const std::byte>> columns;
+};
+
+struct Clock {
+  std::uint64_t step = 0;
+  double time = 0;  ///< [s] t_s + (step - n_s) dt
+  double dt = 0;    ///< [s]
+};
+
+/// A guard stopped the run. `what()` is the whole sentence; the parts are there for tools.
+class NumericalFailure : public std::runtime_error {
+ public:
+  NumericalFailure(std::string criterion, std::uint64_t step, std::string field, std::uint64_t id,
+                   double value, double limit, std::string advice);
+  std::string criterion, field, advice;
+  std::uint64_t step, id;
+  double value, limit;
+};
+
+/// A request that the model cannot serve (exit 2): the text names key, value and the largest safe one.
+class ModelError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// What happened at the end of a step: kind ("change", "fluid_added", ...) and key/value items.
+struct Happening {
+  std::string kind;
+  std::vector<std::pair<std::string, std::string>> items;
+};
+
+/// Numbers that explain a run; never part of the state.
+struct Counters {
+  std::uint64_t list_rebuilds = 0;
+  std::uint64_t porosity_clamps = 0;
+  std::uint64_t drag_porosity_clamps = 0;
+  std::uint64_t weak_coupling = 0;  ///< grain-steps with a Shepard sum below 0.5
+  std::uint64_t grain_substeps = 0;
+  std::vector<std::uint64_t> items_per_thread;  ///< particles worked on by each thread
+  std::vector<std::pair<std::string, std::uint64_t>> passes;  ///< how often each stage ran
+};
+
+enum class OutsideMode { error, push, remove };
+
+struct ChangeOptions {
+  OutsideMode outside = OutsideMode::error;
+  int anchor = 0;  ///< -1: the left wall stays, +1: the right wall stays, 0: both move by half
+};
+
+struct RunOptions {
+  unsigned threads = 1;
+  /// Tests only: rebuild neighbour lists at every step / at pseudo-random steps.
+  std::uint64_t rebuild_seed = 0;
+};
+
+class Simulation {
+ public:
+  /// The first state of a resolved scenario (changes scheduled for step 0 applied).
+  static std::unique_ptr<Simulation> create(const Scenario& resolved, const RunOptions& options);
+  /// The engine with `resolved` as it stood at genesis, holding a recorded state: changes scheduled up
+  /// to the state's step are taken as done. Throws ModelError if the values do not fit the field table.
+  static std::unique_ptr<Simulation> restore(const Scenario& resolved,
+                                             std::span<const FieldSpan> values,
+                                             const RunOptions& options);
+  virtual ~Simulation() = default;
+
+  virtual const std::vector<FieldInfo>& fields() const = 0;
+  virtual FieldSpan field(std::size_t index) const = 0;
+  virtual const std::vector<TableInfo>& tables() const = 0;
+  /// Rows of the last completed step.
+  virtual TableSpan table(std::size_t index) const = 0;
+
+  virtual Clock clock() const = 0;
+  /// The scenario as it stands now, scheduled changes up to now included.
+  virtual const Scenario& scenario() const = 0;
+  /// What happened at the end of the last completed step.
+  virtual const std::vector<Happening>& happenings() const = 0;
+  virtual const Counters& counters() const = 0;
+
+  /// One step; then the changes scheduled for its end. Throws NumericalFailure: the state is then that
+  /// of the last good step, unchanged.
+  virtual void advance() = 0;
+  /// Replaces the state.
+  virtual void set_state(std::span<const FieldSpan> values) = 0;
+  /// Changes keys now, by the fork rules. Throws ModelError; the state is then unchanged.
+  virtual void change(const std::vector<std::pair<std::string, std::string>>& settings,
+                      const ChangeOptions& options) = 0;
+
+  /// Forces on the state as it stands, by the engine's own pass (core/observe reads them).
+  struct WallForces {
+    std::vector<double> on_fluid;   ///< [N or N/m] D components: sum over dummies
+    std::vector<double> on_grains;  ///< by grain-wall contacts, mean over the sub-steps of the last step
+  };
+};
+
+}  // namespace varve::core
