@@ -1,0 +1,2 @@
+# cmake -C tests/presets/release.cmake -B build
+set(CMAKE_BUILD_TYPE Release CACHE STRING "")
