@@ -10,9 +10,6 @@
 
 namespace varve::core {
 
-/// "Not given: derive it" for a real parameter, until resolve() has replaced it.
-inline constexpr double automatic = std::numeric_limits<double>::quiet_NaN();
-
 enum class Precision { double_, float_, mixed };
 enum class Boundary { no_slip, free_slip, periodic, free };
 enum class PressureForm { automatic, excess, full };
@@ -22,6 +19,9 @@ enum class Drag { stokes, schiller_naumann, dallavalle_di_felice, gidaspow, cyli
 enum class Kernel { wendland_c2, cubic, quintic };
 enum class GrainMotion { free, frozen };
 enum class RecordTier { deltas, digests };
+
+/// "Not given: derive it" for a real parameter, until resolve() has replaced it.
+inline constexpr double automatic = std::numeric_limits<double>::quiet_NaN();
 
 struct Domain {
   std::int64_t dimension = 2;
@@ -42,7 +42,7 @@ struct Fluid {
   double density = 1000;       // [kg/m3] rho0
   double viscosity = 0.01;     // [Pa s] mu
   double spacing = 1e-3;       // [m] dx of the first lattice
-  double level = automatic;    // [m] filling height above the bottom; the domain's height if not given
+  double level = automatic;    // [m] filling height above the bottom; else the domain's height
   Kernel kernel = Kernel::wendland_c2;
   double smoothing_ratio = 1.25;   // [-] smoothing_length / spacing
   double sound_speed = automatic;  // [m/s] c0
