@@ -5,8 +5,10 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "io/frame.h"
 
@@ -26,6 +28,9 @@ struct Digest {
 Digest digest_bytes(std::span<const std::byte> bytes);
 Digest digest_text(std::string_view text);
 
+/// XXH3-64 of any bytes: the checksum of the framing, not an identity.
+std::uint64_t checksum(std::span<const std::byte> bytes);
+
 /// Digest of a state: for every field of the schema, in its order, its name, count and values in
 /// little-endian bytes (io/FORMAT.md, "Digest"). Step, time and tables are not part of it, unless
 /// the engine publishes them as fields.
@@ -36,5 +41,9 @@ Digest chain_base(const Schema& schema);
 
 /// chain[n] = H(chain[n-1] || digest[n]).
 Digest chain_next(const Digest& previous, const Digest& state);
+
+/// Digests of parameters and of events, apart from the chain (io/FORMAT.md, "Digest").
+Digest digest_settings(std::span<const std::pair<std::string, std::string>> settings);
+Digest digest_events(std::span<const Event> events);
 
 }  // namespace varve::io
