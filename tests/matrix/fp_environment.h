@@ -1,0 +1,21 @@
+// Checks at run time that arithmetic is the arithmetic that determinism rests on. Compiled with the
+// engine's flags, so that a flag that slips in is seen by a program, not by a reader.
+#pragma once
+
+namespace varve::tests {
+
+/// a*b + c from values the optimiser cannot know: 0 if product and sum are rounded one by one, else
+/// the product's rounding error (the compiler fused them).
+double contraction_residue();
+float contraction_residue_float();
+
+/// True if this thread rounds to nearest, ties to even.
+bool rounds_to_nearest();
+
+/// True if this thread computes and reads subnormal numbers instead of flushing them to zero.
+bool keeps_subnormals();
+
+/// Throws std::runtime_error naming what is wrong in this thread.
+void require_strict_floating_point();
+
+}  // namespace varve::tests
