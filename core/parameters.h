@@ -4,21 +4,18 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <variant>
 #include <vector>
 
 #include "core/scenario.h"
+#include "core/units.h"
 
 namespace varve::core {
-
-/// Exponents of kg, m, s. Angles are pure numbers (rad).
-struct Dimension {
-  int mass = 0, length = 0, time = 0;
-  bool operator==(const Dimension&) const = default;
-};
 
 enum class Change {
   never,       ///< fixed for a family of runs
@@ -54,6 +51,8 @@ std::span<const Parameter> parameters();
 const Parameter* find_parameter(std::string_view key);
 /// The key nearest to a misspelt one, or "" if none is near.
 std::string_view nearest_key(std::string_view key);
+/// Insertions, deletions, substitutions and swaps of neighbours that turn `a` into `b`.
+std::size_t edit_distance(std::string_view a, std::string_view b);
 
 /// A value that could not be taken: `text` says what was found and what is expected.
 struct ValueError {
@@ -66,6 +65,10 @@ std::optional<ValueError> set_parameter(Scenario& scenario, const Parameter& par
 /// The value as canonical text: shortest decimal that reads back to the same bits, SI, no unit.
 std::string get_parameter(const Scenario& scenario, const Parameter& parameter);
 std::string default_text(const Parameter& parameter);
+/// What values a key takes, for messages and help: "a ratio 0..2", "a length > 0 (m, cm, mm, um)".
+std::string expected_text(const Parameter& parameter);
+/// Why a fork cannot change a key: "" if it can.
+std::string_view fixed_reason(const Parameter& parameter);
 
 /// One thing wrong with a scenario as a whole, at a key.
 struct Problem {
@@ -77,10 +80,13 @@ struct Problem {
 /// Returns what makes no sense (all of it); the scenario is usable only if that is empty.
 std::vector<Problem> resolve(Scenario& scenario);
 
-/// Checks fork-changed settings against the table and the limits of the resolved parent; derived
-/// numbers keep the parent's values. Returns the changed scenario in `scenario` if there is no problem.
-std::vector<Problem> apply_settings(Scenario& scenario,
-                                    const std::vector<std::pair<std::string, std::string>>& settings);
+/// Changes keys of a resolved scenario by the fork rules: only keys that the table lets change, within
+/// the limits of the resolved values; derived numbers keep theirs. `anchor` as in ChangeOptions: -1
+/// keeps the left wall, +1 the right one, 0 moves both by half; domain.left follows. The scenario is
+/// unchanged if there is a problem.
+std::vector<Problem> apply_settings(
+    Scenario& scenario, const std::vector<std::pair<std::string, std::string>>& settings,
+    int anchor = 0);
 
 /// Canonical text of a resolved scenario: sections, "key = value" lines, [event.NAME] sections. Reading
 /// it gives the same scenario to the bit.

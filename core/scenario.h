@@ -104,13 +104,13 @@ struct Record {
   std::int64_t keyframe_steps = 256;
 };
 
-/// A change of fork-changeable keys at the end of a given step of the run.
+/// A change of fork-changeable keys at the end of a given step of the run. Either `at` or `at_step` is
+/// given; resolve() replaces `at` by the last step with time <= at + 1e-6 dt.
 struct ScheduledChange {
   std::string name;
-  double at = automatic;     // [s]; the last step with time <= at + 1e-6 dt
-  std::int64_t at_step = -1; // resolved step
+  double at = automatic;      // [s]; automatic once resolved
+  std::int64_t at_step = -1;  // -1: not given
   std::vector<std::pair<std::string, std::string>> settings;  // key, value as text
-  bool operator==(const ScheduledChange&) const = default;
 };
 
 struct Scenario {

@@ -1,0 +1,228 @@
+#include "core/criteria.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/drag.h"
+#include "core/kernel.h"
+#include "core/math.h"
+
+namespace varve::core {
+namespace {
+
+template <int D>
+double balance_speed(const Scenario& scenario, double weight) {
+  const DragLaw<D> law = make_drag_law<D>(scenario.coupling.drag);
+  const auto drag = [&](double speed) {
+    return speed * drag_coefficient<D>(law, {speed, 1.0, scenario.grains.diameter,
+                                             scenario.fluid.density, scenario.fluid.viscosity});
+  };
+  double low = 0, high = 1e-9;
+  while (drag(high) < weight) {
+    low = high;
+    high *= 2;
+    if (high > 1e6) return std::numeric_limits<double>::infinity();
+  }
+  // Halving until the interval holds no further double: the result depends on nothing but the law.
+  for (int i = 0; i < 200; ++i) {
+    const double middle = 0.5 * (low + high);
+    if (middle <= low || middle >= high) break;
+    (drag(middle) < weight ? low : high) = middle;
+  }
+  return high;
+}
+
+double length_of(double x, double y) { return std::sqrt(x * x + y * y); }
+
+bool grains_move(const Scenario& scenario) {
+  return scenario.has_grains() && scenario.grains.motion == GrainMotion::free;
+}
+
+/// What a body force can do to the fluid: no more than a free fall over the domain's longer side, and no
+/// more than the middle of a plane channel where viscosity holds it.
+double body_force_speed(const Scenario& s) {
+  const double force = length_of(s.fluid.body_force_x, s.fluid.body_force_y);
+  if (force == 0) return 0;
+  const double fall = std::sqrt(2 * force * std::max(s.domain.width, s.domain.height));
+  const bool along_x = std::abs(s.fluid.body_force_x) >= std::abs(s.fluid.body_force_y);
+  const bool held = along_x ? s.domain.bottom != Boundary::periodic
+                            : s.domain.sides != Boundary::periodic;
+  if (!held) return fall;
+  const double gap = along_x ? s.domain.height : s.domain.width;
+  const double channel = force * gap * gap * s.fluid.density / (8 * s.fluid.viscosity);
+  return std::min(fall, channel);
+}
+
+}  // namespace
+
+double smoothing_length(const Scenario& s) { return s.fluid.smoothing_ratio * s.fluid.spacing; }
+
+double kernel_support(const Scenario& s) {
+  return support_ratio(s.fluid.kernel) * smoothing_length(s);
+}
+
+double coupling_radius(const Scenario& s) { return 2 * s.coupling.length; }
+
+double periodic_minimum(const Scenario& s) {
+  double least = 0;
+  if (s.has_fluid()) least = kernel_support(s) + list_skin_ratio * smoothing_length(s);
+  if (s.is_coupled())
+    least = std::max(least, coupling_radius(s) + list_skin_ratio * s.coupling.length);
+  if (s.has_grains()) least = std::max(least, s.grains.diameter * (1 + list_skin_ratio));
+  return 2 * least;
+}
+
+double grain_volume(const Scenario& s) {
+  const double d = s.grains.diameter;
+  return s.domain.dimension == 2 ? pi * d * d / 4 : pi * d * d * d / 6;
+}
+
+double grain_mass(const Scenario& s) { return s.grains.density * grain_volume(s); }
+
+double least_effective_mass(const Scenario& s) {
+  const bool one = s.grains.rows == 1 && s.grains.columns == 1;
+  return one ? grain_mass(s) : 0.5 * grain_mass(s);
+}
+
+double contact_time(const Scenario& s) {
+  return pi * std::sqrt(least_effective_mass(s) / s.contact.stiffness);
+}
+
+std::int64_t substeps(const Scenario& s) {
+  if (s.time.substeps > 0) return s.time.substeps;
+  if (!grains_move(s)) return 1;
+  // A step of exactly tc0 / 30 is one sub-step, whichever way the division rounds.
+  const double exact = substeps_per_contact * s.time.dt / contact_time(s);
+  return std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(exact * (1 - 1e-12))));
+}
+
+bool has_free_surface(const Scenario& s) {
+  if (!s.has_fluid()) return false;
+  return s.domain.top == Boundary::free || s.fluid.level < s.domain.height;
+}
+
+double terminal_speed(const Scenario& s) {
+  if (!s.has_grains() || !s.has_fluid()) return 0;
+  const double excess = std::abs(s.grains.density - s.fluid.density);
+  const double weight = excess * grain_volume(s) * s.gravity.magnitude;
+  if (weight == 0) return 0;
+  return s.domain.dimension == 2 ? balance_speed<2>(s, weight) : balance_speed<3>(s, weight);
+}
+
+double SpeedEstimate::sound_speed() const {
+  const double needed = std::max(10 * fluid, 20 * grains);
+  return needed > 0 ? needed : 1.0;
+}
+
+SpeedEstimate expected_speeds(const Scenario& s) {
+  SpeedEstimate estimate;
+  estimate.fluid_reason = "no force acts on the fluid";
+  if (!s.has_fluid()) {
+    estimate.fluid_reason = "no fluid";
+  } else {
+    const double driven = body_force_speed(s);
+    if (driven > 0) {
+      estimate.fluid = driven;
+      estimate.fluid_reason = "body force over the domain";
+    }
+    if (s.fluid.pressure == PressureForm::full && s.gravity.magnitude > 0) {
+      const double level = std::isnan(s.fluid.level) ? s.domain.height : s.fluid.level;
+      const double fall = std::sqrt(2 * s.gravity.magnitude * level);
+      if (fall > estimate.fluid) {
+        estimate.fluid = fall;
+        estimate.fluid_reason = "full pressure: sqrt(2 g H)";
+      }
+    }
+  }
+  estimate.grains_reason = "no grains";
+  if (s.has_grains() && s.grains.motion == GrainMotion::frozen) {
+    estimate.grains_reason = "grains are frozen";
+  } else if (s.has_grains()) {
+    const double first = length_of(s.grains.velocity_x, s.grains.velocity_y);
+    const double settling = s.is_coupled() ? terminal_speed(s) : 0;
+    estimate.grains = std::max(first, settling);
+    estimate.grains_reason =
+        settling >= first ? "terminal speed of one grain" : "speed of the grains at the start";
+    if (!s.is_coupled()) estimate.grains_reason = "grains do not feel the fluid";
+  }
+  return estimate;
+}
+
+double outer_acceleration(const Scenario& s) {
+  double largest = 0;
+  if (s.has_fluid()) {
+    largest = length_of(s.fluid.body_force_x, s.fluid.body_force_y);
+    if (s.fluid.pressure != PressureForm::excess) largest += s.gravity.magnitude;
+  }
+  if (grains_move(s)) {
+    const double ratio =
+        s.is_coupled() ? std::abs(1 - s.fluid.density / s.grains.density) : 1.0;
+    largest = std::max(largest, std::min(1.0, ratio) * s.gravity.magnitude);
+  }
+  return largest;
+}
+
+std::vector<StepLimit> step_limits(const Scenario& s) {
+  std::vector<StepLimit> limits;
+  if (s.has_fluid()) {
+    const double h = smoothing_length(s);
+    const double cfl = s.time.cfl * h / s.fluid.sound_speed;
+    limits.push_back({"cfl", "cfl h / c0", cfl, cfl});
+    const double g = outer_acceleration(s);
+    if (g > 0) {
+      const double falling = 0.25 * std::sqrt(h / g);
+      limits.push_back({"acceleration", "0.25 sqrt(h / g)", falling, falling});
+    }
+    const double viscous = 0.125 * h * h * s.fluid.density / s.fluid.viscosity;
+    limits.push_back({"viscosity", "0.125 h^2 rho0 / mu", viscous, viscous});
+  }
+  if (grains_move(s)) {
+    const double tc0 = contact_time(s);
+    // With fluid the grains are sub-stepped as often as needed, unless the number was given.
+    const bool counted = s.time.substeps > 0;
+    const double n = counted ? static_cast<double>(s.time.substeps) : 1.0;
+    if (counted) {
+      limits.push_back({"contact", "substeps tc0 / 30", n * tc0 / substeps_per_contact,
+                        n * tc0 / substeps_per_contact_min});
+    } else if (!s.has_fluid()) {
+      constexpr double without_limit = std::numeric_limits<double>::infinity();
+      limits.push_back({"contact", "tc0 / 30", tc0 / substeps_per_contact, without_limit});
+    }
+  }
+  if (limits.empty()) limits.push_back({"nothing moves", "1 ms", 1e-3, 1e-3});
+  return limits;
+}
+
+const StepLimit& binding_limit(const std::vector<StepLimit>& limits, bool of_largest) {
+  return *std::min_element(limits.begin(), limits.end(), [&](const auto& a, const auto& b) {
+    return of_largest ? a.largest < b.largest : a.chosen < b.chosen;
+  });
+}
+
+bool within(double dt, double limit) { return dt <= limit * (1 + 1e-9); }
+
+std::uint64_t last_step_at(double seconds, double dt) {
+  const double exact = seconds / dt + 1e-6;
+  if (!(exact > 0)) return 0;
+  return static_cast<std::uint64_t>(std::floor(std::min(exact, 9e15)));
+}
+
+std::uint64_t first_step_at(double seconds, double dt) {
+  const double exact = seconds / dt - 1e-6;
+  if (!(exact > 0)) return 0;
+  return static_cast<std::uint64_t>(std::ceil(std::min(exact, 9e15)));
+}
+
+Lattice fluid_lattice(const Scenario& s) {
+  if (!s.has_fluid()) return {};
+  const double level = std::isnan(s.fluid.level) ? s.domain.height : s.fluid.level;
+  const auto along = [&](double extent) {
+    return nearest_integer(std::min(extent / s.fluid.spacing, 1e15));
+  };
+  return {along(s.domain.width), along(level)};
+}
+
+double grain_pitch(const Scenario& s) { return s.grains.diameter * (1 + s.grains.gap); }
+
+}  // namespace varve::core

@@ -1,0 +1,92 @@
+// Derived numbers of a scenario: masses, contact times, expected speeds, and the limits of the time
+// step with the reason for each. Everything here is a pure function of a Scenario; core/PHYSICS.md has
+// the sources. In 2D masses and stiffnesses are per metre of depth.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/scenario.h"
+
+namespace varve::core {
+
+/// [m] h = smoothing_ratio x spacing.
+double smoothing_length(const Scenario& scenario);
+/// [m] radius beyond which two fluid particles do not see each other.
+double kernel_support(const Scenario& scenario);
+/// [m] Rc = 2 hc: radius within which a grain and a fluid particle see each other. Needs coupling.length.
+double coupling_radius(const Scenario& scenario);
+/// The most that a neighbour list may add to a support, over h (fluid) or hc (coupling).
+inline constexpr double list_skin_ratio = 0.25;
+/// [m] least extent along a periodic direction: twice the largest support with a list's skin, so that
+/// no pair meets through two images.
+double periodic_minimum(const Scenario& scenario);
+
+/// [m3, m2 in 2D] of one grain.
+double grain_volume(const Scenario& scenario);
+/// [kg, kg/m in 2D] of one grain.
+double grain_mass(const Scenario& scenario);
+/// [kg, kg/m in 2D] least effective mass of any contact: m/2 of a pair, m where there is one grain.
+double least_effective_mass(const Scenario& scenario);
+/// [s] tc0 = pi sqrt(m_eff,min / k), undamped. Needs contact.stiffness.
+double contact_time(const Scenario& scenario);
+/// Grain sub-steps per step: time.substeps, or ceil(30 dt / tc0) where that is 0; 1 without grains
+/// that move. Needs contact.stiffness and time.dt.
+std::int64_t substeps(const Scenario& scenario);
+/// Sub-steps to a shortest contact where they are chosen, and the fewest that are let through.
+inline constexpr double substeps_per_contact = 30;
+inline constexpr double substeps_per_contact_min = 10;
+
+/// A free surface: an open top, or a box that is not full.
+bool has_free_surface(const Scenario& scenario);
+
+/// [m/s] speed at which drag holds the submerged weight of one grain in fluid at rest; 0 where the two
+/// densities are equal or there is no gravity. Infinite if the drag law cannot hold it below 1e6 m/s.
+double terminal_speed(const Scenario& scenario);
+
+/// Speeds from which the sound speed is chosen, each with its reason.
+struct SpeedEstimate {
+  double fluid = 0;          ///< [m/s]
+  std::string fluid_reason;  ///< "a free surface: sqrt(2 g H)"
+  double grains = 0;         ///< [m/s]
+  std::string grains_reason;
+  /// [m/s] max(10 fluid, 20 grains); 1 m/s where nothing can move.
+  double sound_speed() const;
+};
+SpeedEstimate expected_speeds(const Scenario& scenario);
+
+/// One criterion of the time step.
+struct StepLimit {
+  std::string_view name;     ///< "cfl", "acceleration", "viscosity", "contact"
+  std::string_view formula;  ///< "cfl h / c0"
+  double chosen = 0;         ///< [s] largest step that resolve() takes under it
+  double largest = 0;        ///< [s] largest step that may be set under it
+};
+/// The criteria that apply. Needs fluid.sound_speed and contact.stiffness; never empty for a scenario
+/// with fluid or moving grains.
+std::vector<StepLimit> step_limits(const Scenario& scenario);
+/// The limit with the least `chosen` (or `largest`) value.
+const StepLimit& binding_limit(const std::vector<StepLimit>& limits, bool of_largest = false);
+/// True if `dt` is within `limit`, but for rounding.
+bool within(double dt, double limit);
+
+/// [m/s2] largest acceleration that acts from outside on fluid or grains.
+double outer_acceleration(const Scenario& scenario);
+
+/// The first step whose time is not before `seconds`, counted from time 0 with a fixed dt.
+std::uint64_t first_step_at(double seconds, double dt);
+/// The last step whose time is <= seconds + 1e-6 dt, counted from time 0 with a fixed dt.
+std::uint64_t last_step_at(double seconds, double dt);
+
+/// Lattice of the fluid at the start: particles along x and y. {0, 0} without fluid.
+struct Lattice {
+  std::int64_t columns = 0, rows = 0;
+};
+Lattice fluid_lattice(const Scenario& scenario);
+
+/// [m] distance between the centres of neighbouring grains in the array.
+double grain_pitch(const Scenario& scenario);
+
+}  // namespace varve::core

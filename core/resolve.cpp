@@ -1,0 +1,330 @@
+// A scenario as written becomes one without anything left open, or a list of what makes no sense.
+#include <algorithm>
+#include <cmath>
+
+#include "core/criteria.h"
+#include "core/kernel.h"
+#include "core/math.h"
+#include "core/parameters.h"
+
+namespace varve::core {
+namespace {
+
+// Far above what one machine holds; a slip of the unit is caught before memory is asked for.
+constexpr double particles_max = 1e8;
+constexpr double grains_max = 1e7;
+constexpr std::int64_t substeps_max = 1'000'000;
+constexpr double rounding = 1e-9;
+
+class Resolver {
+ public:
+  explicit Resolver(Scenario& scenario) : s_(scenario) {}
+
+  std::vector<Problem> run() {
+    if (!check_table() || !check_extent()) return std::move(problems_);
+    resolve_fluid();
+    resolve_grains();
+    resolve_coupling();
+    check_periodic();
+    if (problems_.empty()) resolve_sound_speed();
+    if (problems_.empty()) resolve_step();
+    if (problems_.empty()) resolve_changes();
+    return std::move(problems_);
+  }
+
+ private:
+  void problem(std::string key, std::string text) {
+    problems_.push_back({std::move(key), std::move(text)});
+  }
+
+  /// Values set by a program rather than by text obey the same ranges.
+  bool check_table() {
+    for (const Parameter& parameter : parameters()) {
+      if (const auto* real = std::get_if<Parameter::Real>(&parameter.access)) {
+        const double value = (*real)(s_);
+        if (std::isnan(value)) continue;
+        const bool above = parameter.lowest_open ? value > parameter.lowest
+                                                 : value >= parameter.lowest;
+        if (above && value <= parameter.highest) continue;
+      } else if (const auto* whole = std::get_if<Parameter::Integer>(&parameter.access)) {
+        const double value = static_cast<double>((*whole)(s_));
+        if (value >= parameter.lowest && value <= parameter.highest) continue;
+      } else {
+        continue;
+      }
+      problem(std::string(parameter.key), "'" + get_parameter(s_, parameter) +
+                                              "' is out of range; expected " +
+                                              expected_text(parameter));
+    }
+    return problems_.empty();
+  }
+
+  bool check_extent() {
+    if (std::isnan(s_.domain.width))
+      problem("domain.width", "missing; expected a length > 0, such as '6 cm'");
+    if (std::isnan(s_.domain.height))
+      problem("domain.height", "missing; expected a length > 0, such as '12 cm'");
+    if (s_.domain.dimension == 3)
+      problem("domain.dimension", "3 is not built into this version; expected 2");
+    if (!s_.has_fluid() && !s_.has_grains())
+      problem("fluid.present", "neither fluid nor grains: there is nothing to simulate");
+    const bool bottom = s_.domain.bottom == Boundary::periodic;
+    const bool top = s_.domain.top == Boundary::periodic;
+    if (bottom != top)
+      problem(bottom ? "domain.bottom" : "domain.top",
+              "periodic on one side only; bottom and top must both be periodic");
+    return problems_.empty();
+  }
+
+  /// An extent filled by the lattice must hold a whole number of spacings.
+  void check_lattice(const std::string& key, double extent) {
+    const double exact = extent / s_.fluid.spacing;
+    if (exact > particles_max) {
+      problem("fluid.spacing", number_text(s_.fluid.spacing) + " m needs " + rough_number(exact) +
+                                   " particles along " + key + "; at most " +
+                                   rough_number(particles_max) + " in all are possible");
+      return;
+    }
+    const double whole = std::floor(exact + 0.5);
+    if (whole >= 1 && std::abs(exact - whole) <= 1e-6) return;
+    const double below = std::max(1.0, std::floor(exact)), above = std::floor(exact) + 1;
+    std::string nearest = rough_number(above * s_.fluid.spacing) + " m";
+    if (below != above) nearest = rough_number(below * s_.fluid.spacing) + " m or " + nearest;
+    problem(key, number_text(extent) + " m is not a whole number of spacings of " +
+                     number_text(s_.fluid.spacing) + " m; nearest: " + nearest +
+                     " (or change fluid.spacing)");
+  }
+
+  void resolve_fluid() {
+    if (!s_.has_fluid()) return;
+    if (std::isnan(s_.fluid.level)) s_.fluid.level = s_.domain.height;
+    if (s_.fluid.level > s_.domain.height * (1 + rounding))
+      problem("fluid.level", number_text(s_.fluid.level) + " m is above the domain; largest value " +
+                                 number_text(s_.domain.height) + " m (domain.height)");
+    if (s_.domain.top == Boundary::periodic && s_.fluid.level < s_.domain.height)
+      problem("fluid.level", "bottom and top are periodic: the domain must be full; expected " +
+                                 number_text(s_.domain.height) + " m or auto");
+    check_lattice("domain.width", s_.domain.width);
+    check_lattice(s_.fluid.level == s_.domain.height ? "domain.height" : "fluid.level",
+                  s_.fluid.level);
+    const double particles =
+        (s_.domain.width / s_.fluid.spacing) * (s_.fluid.level / s_.fluid.spacing);
+    if (problems_.empty() && particles > particles_max)
+      problem("fluid.spacing", number_text(s_.fluid.spacing) + " m makes " +
+                                   rough_number(particles) + " fluid particles; at most " +
+                                   rough_number(particles_max) + " are possible");
+    resolve_pressure();
+  }
+
+  void resolve_pressure() {
+    const bool open = has_free_surface(s_);
+    PressureForm& form = s_.fluid.pressure;
+    if (form == PressureForm::automatic) form = open ? PressureForm::full : PressureForm::excess;
+    if (form == PressureForm::excess && open)
+      problem("fluid.pressure",
+              "'excess' needs a closed, full or periodic domain, and this one has a free surface, "
+              "where the full pressure must vanish; expected full or auto");
+    if (form == PressureForm::full && s_.domain.bottom == Boundary::periodic &&
+        s_.gravity.magnitude > 0)
+      problem("fluid.pressure",
+              "'full' with periodic bottom and top: nothing would hold the fluid against gravity; "
+              "expected excess or auto");
+  }
+
+  void resolve_grains() {
+    if (!s_.has_grains()) return;
+    const double count = static_cast<double>(s_.grains.rows) * static_cast<double>(s_.grains.columns);
+    if (count > grains_max) {
+      problem("grains.rows", rough_number(count) + " grains; at most " + rough_number(grains_max) +
+                                 " are possible");
+      return;
+    }
+    const double pitch = grain_pitch(s_);
+    const double half_width = 0.5 * static_cast<double>(s_.grains.columns - 1) * pitch;
+    const double array_height = static_cast<double>(s_.grains.rows - 1) * pitch;
+    if (std::isnan(s_.grains.centre_x))
+      s_.grains.centre_x = s_.domain.left + 0.5 * s_.domain.width;
+    if (std::isnan(s_.grains.lowest_y))
+      s_.grains.lowest_y = 0.5 * (s_.domain.height - array_height);
+    check_inside("grains.centre_x", s_.domain.left, s_.domain.width,
+                 s_.grains.centre_x - half_width, 2 * half_width,
+                 s_.domain.sides == Boundary::periodic, "wide", "columns");
+    check_inside("grains.lowest_y", 0, s_.domain.height, s_.grains.lowest_y, array_height,
+                 s_.domain.bottom == Boundary::periodic, "high", "rows");
+    if (count > 1 && s_.grains.jitter > 0.5 * s_.grains.gap * (1 + rounding))
+      problem("grains.jitter", number_text(s_.grains.jitter) +
+                                   " can make neighbours overlap; largest safe value " +
+                                   number_below(0.5 * s_.grains.gap) + " (half of grains.gap)");
+    if (std::isnan(s_.contact.tangential_ratio))
+      s_.contact.tangential_ratio = s_.domain.dimension == 2 ? 1.0 / 3.0 : 2.0 / 7.0;
+    if (std::isnan(s_.contact.stiffness)) {
+      const double frequency = pi / s_.contact.time;
+      s_.contact.stiffness = grain_mass(s_) * (frequency * frequency);
+    }
+  }
+
+  /// Grains whose first centre lies at `first` and whose last lies `span` further must fit between
+  /// `from` and `from + extent`.
+  void check_inside(const std::string& key, double from, double extent, double first, double span,
+                    bool periodic, std::string_view word, std::string_view lines) {
+    const double reach = s_.grains.diameter * (0.5 + s_.grains.jitter);
+    const double slack = rounding * extent;
+    const double room = extent - span - 2 * reach;
+    if (room < -slack) {
+      problem("grains." + std::string(lines),
+              "the array is " + rough_number(span + 2 * reach) + " m " + std::string(word) +
+                  ", the domain " + number_text(extent) + " m; largest number that fits " +
+                  std::to_string(static_cast<std::int64_t>(std::max(
+                      0.0, std::floor((extent - 2 * reach) / grain_pitch(s_) + 1 + rounding)))));
+      return;
+    }
+    if (periodic) return;
+    const double low = from + reach, high = from + extent - reach - span;
+    if (first >= low - slack && first <= high + slack) return;
+    // The key names the middle of the columns but the first of the rows.
+    const double shift = key == "grains.centre_x" ? 0.5 * span : 0.0;
+    problem(key, number_text(first + shift) + " m puts grains outside the domain; expected " +
+                     rough_number(low + shift) + ".." + rough_number(high + shift) + " m");
+  }
+
+  void resolve_coupling() {
+    const bool flat = s_.domain.dimension == 2;
+    if (std::isnan(s_.coupling.porosity_floor)) s_.coupling.porosity_floor = flat ? 0.30 : 0.25;
+    if (std::isnan(s_.coupling.length)) s_.coupling.length = s_.grains.diameter;
+    if (!s_.is_coupled()) return;
+    if (!flat && s_.coupling.drag == Drag::cylinder)
+      problem("coupling.drag", "'cylinder' is a law for discs; expected another one in 3D");
+    // Porosity at the centre of a lone grain is 1 - V W(0): it must stay positive.
+    constexpr Kernel widest = Kernel::wendland_c2;
+    const double d = s_.grains.diameter;
+    double least = std::sqrt(kernel_sigma<2, widest>() * grain_volume(s_));
+    if (!flat) {
+      const double volume = kernel_sigma<3, widest>() * grain_volume(s_);
+      least = d;  // cube root by Newton's iteration, from above
+      for (int i = 0; i < 60; ++i) least -= (least - volume / (least * least)) / 3;
+    }
+    if (s_.coupling.length <= least)
+      problem("coupling.length",
+              number_text(s_.coupling.length) + " m is " + rough_number(s_.coupling.length / d) +
+                  " d: the porosity inside a grain would not be positive; smallest safe value " +
+                  number_above(least * 1.001) + " m");
+  }
+
+  void check_periodic() {
+    const double least = periodic_minimum(s_);
+    const auto check = [&](Boundary side, const char* key, double extent) {
+      if (side != Boundary::periodic || extent >= least) return;
+      problem(key, number_text(extent) +
+                       " m is too small for periodic sides: particles would meet their own images; "
+                       "smallest safe value " + number_above(least) + " m");
+    };
+    check(s_.domain.sides, "domain.width", s_.domain.width);
+    check(s_.domain.bottom, "domain.height", s_.domain.height);
+  }
+
+  void resolve_sound_speed() {
+    if (!s_.has_fluid() || !std::isnan(s_.fluid.sound_speed)) return;
+    const double speed = expected_speeds(s_).sound_speed();
+    const Parameter& parameter = *find_parameter("fluid.sound_speed");
+    if (!(speed <= parameter.highest)) {
+      problem("fluid.sound_speed", "auto gives " + rough_number(speed) +
+                                       " m/s, far beyond any flow; check sizes, densities and "
+                                       "viscosity, or give a value");
+      return;
+    }
+    s_.fluid.sound_speed = speed;
+  }
+
+  void resolve_step() {
+    const std::vector<StepLimit> limits = step_limits(s_);
+    if (std::isnan(s_.time.dt)) {
+      s_.time.dt = binding_limit(limits).chosen;
+    } else if (const StepLimit& limit = binding_limit(limits, true);
+               !within(s_.time.dt, limit.largest)) {
+      problem("time.dt", number_text(s_.time.dt) + " s is above the " + std::string(limit.name) +
+                             " limit " + std::string(limit.formula) + "; largest safe value " +
+                             number_below(limit.largest) + " s");
+      return;
+    }
+    if (s_.has_grains() && substeps(s_) > substeps_max)
+      problem("contact.stiffness", number_text(s_.contact.stiffness) + " N/m needs " +
+                                       std::to_string(substeps(s_)) +
+                                       " grain sub-steps per step; at most " +
+                                       std::to_string(substeps_max) + " are possible");
+    if (s_.time.until > 0 && s_.time.until / s_.time.dt > 1e15)
+      problem("time.until", number_text(s_.time.until) + " s is more than 1e15 steps");
+  }
+
+  /// Walks through the scheduled changes as the run will: each is checked against the scenario as it
+  /// then stands, and a changed dt shifts the clock for those behind it.
+  void resolve_changes() {
+    for (std::size_t i = 0; i < s_.changes.size(); ++i) check_schedule(s_.changes[i], i);
+    if (!problems_.empty()) return;
+    Scenario now = s_;
+    std::vector<ScheduledChange> waiting = std::move(s_.changes);
+    s_.changes.clear();
+    now.changes.clear();
+    std::uint64_t since_step = 0;
+    double since_time = 0;
+    while (!waiting.empty()) {
+      const auto step_of = [&](const ScheduledChange& change) {
+        if (change.at_step >= 0) return static_cast<std::uint64_t>(change.at_step);
+        return since_step + last_step_at(change.at - since_time, now.time.dt);
+      };
+      auto next = waiting.begin();
+      for (auto it = waiting.begin(); it != waiting.end(); ++it)
+        if (step_of(*it) < step_of(*next)) next = it;
+      ScheduledChange change = std::move(*next);
+      const std::uint64_t step = step_of(change);
+      waiting.erase(next);
+      change.at_step = static_cast<std::int64_t>(step);
+      change.at = automatic;
+      const double dt = now.time.dt;
+      apply_change(now, change);
+      if (now.time.dt != dt) {
+        since_time += static_cast<double>(step - since_step) * dt;
+        since_step = step;
+      }
+      s_.changes.push_back(std::move(change));
+    }
+  }
+
+  void check_schedule(const ScheduledChange& change, std::size_t index) {
+    const std::string section = "event." + change.name;
+    if (change.name.empty()) problem("event", "an event needs a name, as in [event.softer]");
+    for (char c : change.name)
+      if (!((c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
+            c == '_' || c == '-')) {
+        problem(section, "the name of an event may hold letters, digits, '_' and '-'");
+        break;
+      }
+    for (std::size_t i = 0; i < index; ++i)
+      if (s_.changes[i].name == change.name) problem(section, "there are two events of this name");
+    if (change.at_step < 0 && std::isnan(change.at))
+      problem(section + ".at", "missing; expected a time, such as '0.3 s' (or at_step, a step)");
+    if (change.at < 0)
+      problem(section + ".at", number_text(change.at) + " s lies before the start; expected >= 0");
+    if (change.settings.empty()) problem(section, "the event changes nothing; expected a key");
+  }
+
+  void apply_change(Scenario& now, ScheduledChange& change) {
+    for (const Problem& found : apply_settings(now, change.settings))
+      problem("event." + change.name + "." + found.key, found.text);
+    // Values in their canonical form, so that equal scenarios have equal texts.
+    for (auto& [key, value] : change.settings) {
+      const Parameter* parameter = find_parameter(key);
+      Scenario scratch;
+      if (parameter && !set_parameter(scratch, *parameter, value))
+        value = get_parameter(scratch, *parameter);
+    }
+  }
+
+  Scenario& s_;
+  std::vector<Problem> problems_;
+};
+
+}  // namespace
+
+std::vector<Problem> resolve(Scenario& scenario) { return Resolver(scenario).run(); }
+
+}  // namespace varve::core
