@@ -1,6 +1,6 @@
-// Small scenes with fluid, grains, contacts and changes of geometry, run under every thread count and
-// with neighbour lists rebuilt at random; every step's digest must be the same. What it prints is the
-// same text on every compiler, optimisation level, instruction set and byte order.
+// Small scenes with fluid, grains, contacts and changes of geometry, run under every thread count
+// and with neighbour lists rebuilt at random; every step's digest must be the same. What it prints
+// is the same text on every compiler, optimisation level, instruction set and byte order.
 #include <algorithm>
 #include <cstdint>
 #include <cstdlib>
@@ -151,7 +151,8 @@ std::uint64_t count_of(const core::Simulation& simulation, const std::string& po
 // ---- running -----------------------------------------------------------------------------------
 
 /// A fresh engine holding a copy of the state of `old`.
-std::unique_ptr<core::Simulation> moved(const core::Simulation& old, const core::RunOptions& options) {
+std::unique_ptr<core::Simulation> moved(const core::Simulation& old,
+                                        const core::RunOptions& options) {
   std::vector<std::vector<std::byte>> copies;
   std::vector<core::FieldSpan> values;
   copies.reserve(old.fields().size());
@@ -334,9 +335,9 @@ void compare_with_file(const std::string& path, const std::string& text) {
   std::ostringstream expected;
   expected << file.rdbuf();
   if (expected.str() != text) {
-    fail(path + ": differs from what this build computes. If the change of bits is intended, raise " +
-         "core::engine_revision, run `tests/matrix/run --bless` and say why in the commit. Here:\n" +
-         text + "expected:\n" + expected.str());
+    fail(path + ": differs from what this build computes. If the change of bits is intended, " +
+         "raise core::engine_revision, run `tests/matrix/run --bless` and say why in the commit. " +
+         "Here:\n" + text + "expected:\n" + expected.str());
   }
 }
 
