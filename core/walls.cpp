@@ -1,6 +1,5 @@
 #include "core/walls.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include "core/kernel.h"
@@ -38,11 +37,14 @@ std::vector<WallPlane> wall_planes(const Scenario& scenario) {
   return walls;
 }
 
-int dummy_layers(const Scenario& scenario) {
+int fluid_dummy_layers(const Scenario& scenario) {
   const Fluid& f = scenario.fluid;
-  const int fluid = layers_within(support_ratio(f.kernel) * f.smoothing_ratio * f.spacing, f.spacing);
-  if (!scenario.is_coupled()) return fluid;
-  return std::max(fluid, layers_within(2.0 * scenario.coupling.length, f.spacing));
+  return layers_within(support_ratio(f.kernel) * f.smoothing_ratio * f.spacing, f.spacing);
+}
+
+int coupling_dummy_layers(const Scenario& scenario) {
+  if (!scenario.is_coupled()) return 0;
+  return layers_within(2.0 * scenario.coupling.length, scenario.fluid.spacing);
 }
 
 std::int64_t whole_spacings(const char* key, double length, double spacing) {
@@ -57,12 +59,11 @@ std::int64_t whole_spacings(const char* key, double length, double spacing) {
   throw ModelError(text + rough_number(below + spacing) + " m");
 }
 
-std::vector<WallDummy<2>> wall_dummies(const Scenario& scenario) {
+std::vector<WallDummy<2>> wall_dummies(const Scenario& scenario, int layers) {
   std::vector<WallDummy<2>> dummies;
-  if (!scenario.has_fluid()) return dummies;
+  if (!scenario.has_fluid() || layers <= 0) return dummies;
   const Domain& d = scenario.domain;
   const double dx = scenario.fluid.spacing;
-  const int layers = dummy_layers(scenario);
   const Box<2> box = domain_box(scenario);
   const std::int64_t columns = whole_spacings("domain.width", d.width, dx);
   const std::int64_t rows = whole_spacings("domain.height", d.height, dx);

@@ -78,15 +78,16 @@ struct WallDummy {
   Boundary kind;            ///< of that wall
 };
 
-/// Layers of dummies: as many as a fluid particle at a wall can see within its kernel's support and,
-/// where fluid and grains are coupled, as a grain at a wall can see within 2 hc.
-int dummy_layers(const Scenario& scenario);
+/// Layers of dummies that a fluid particle at a wall can see: kernel support / dx, rounded up.
+int fluid_dummy_layers(const Scenario& scenario);
+/// Layers that a grain at a wall can see within 2 hc, for porosity; 0 if the scene is not coupled.
+int coupling_dummy_layers(const Scenario& scenario);
 
-/// Layers of dummies dx apart outside each wall, the first dx/2 outside, corners included, none beyond
-/// periodic sides or a free top. Side walls stand as high as the domain. Row by row from the bottom,
-/// each row from the left. Empty without fluid. Throws ModelError if the domain is not a whole number
-/// of spacings wide and high.
-std::vector<WallDummy<2>> wall_dummies(const Scenario& scenario);
+/// `layers` layers of dummies dx apart outside each wall, the first dx/2 outside, corners included,
+/// none beyond periodic sides or a free top. Side walls stand as high as the domain. Row by row from
+/// the bottom, each row from the left. Empty without fluid. Throws ModelError if the domain is not a
+/// whole number of spacings wide and high.
+std::vector<WallDummy<2>> wall_dummies(const Scenario& scenario, int layers);
 
 /// length / spacing, which must be whole to 1e-6; otherwise throws ModelError naming `key` and the
 /// nearest lengths that are.
