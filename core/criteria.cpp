@@ -39,8 +39,8 @@ bool grains_move(const Scenario& scenario) {
   return scenario.has_grains() && scenario.grains.motion == GrainMotion::free;
 }
 
-/// What a body force can do to the fluid: no more than a free fall over the domain's longer side, and no
-/// more than the middle of a plane channel where viscosity holds it.
+/// What a body force can do to the fluid: no more than a free fall over the domain's longer side,
+/// and no more than the middle of a plane channel where viscosity holds it.
 double body_force_speed(const Scenario& s) {
   const double force = length_of(s.fluid.body_force_x, s.fluid.body_force_y);
   if (force == 0) return 0;

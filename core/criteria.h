@@ -1,6 +1,6 @@
 // Derived numbers of a scenario: masses, contact times, expected speeds, and the limits of the time
-// step with the reason for each. Everything here is a pure function of a Scenario; core/PHYSICS.md has
-// the sources. In 2D masses and stiffnesses are per metre of depth.
+// step with the reason for each. Everything here is a pure function of a Scenario; core/PHYSICS.md
+// has the sources. In 2D masses and stiffnesses are per metre of depth.
 #pragma once
 
 #include <cstdint>
@@ -16,12 +16,13 @@ namespace varve::core {
 double smoothing_length(const Scenario& scenario);
 /// [m] radius beyond which two fluid particles do not see each other.
 double kernel_support(const Scenario& scenario);
-/// [m] Rc = 2 hc: radius within which a grain and a fluid particle see each other. Needs coupling.length.
+/// [m] Rc = 2 hc: radius within which a grain and a fluid particle see each other. Needs
+/// coupling.length.
 double coupling_radius(const Scenario& scenario);
 /// The most that a neighbour list may add to a support, over h (fluid) or hc (coupling).
 inline constexpr double list_skin_ratio = 0.25;
-/// [m] least extent along a periodic direction: twice the largest support with a list's skin, so that
-/// no pair meets through two images.
+/// [m] least extent along a periodic direction: twice the largest support with a list's skin, so
+/// that no pair meets through two images.
 double periodic_minimum(const Scenario& scenario);
 
 /// [m3, m2 in 2D] of one grain.
@@ -42,8 +43,9 @@ inline constexpr double substeps_per_contact_min = 10;
 /// A free surface: an open top, or a box that is not full.
 bool has_free_surface(const Scenario& scenario);
 
-/// [m/s] speed at which drag holds the submerged weight of one grain in fluid at rest; 0 where the two
-/// densities are equal or there is no gravity. Infinite if the drag law cannot hold it below 1e6 m/s.
+/// [m/s] speed at which drag holds the submerged weight of one grain in fluid at rest; 0 where the
+/// two densities are equal or there is no gravity. Infinite if the drag law cannot hold it below
+/// 1e6 m/s.
 double terminal_speed(const Scenario& scenario);
 
 /// Speeds from which the sound speed is chosen, each with its reason.
@@ -64,8 +66,8 @@ struct StepLimit {
   double chosen = 0;         ///< [s] largest step that resolve() takes under it
   double largest = 0;        ///< [s] largest step that may be set under it
 };
-/// The criteria that apply. Needs fluid.sound_speed and contact.stiffness; never empty for a scenario
-/// with fluid or moving grains.
+/// The criteria that apply. Needs fluid.sound_speed and contact.stiffness; never empty for a
+/// scenario with fluid or moving grains.
 std::vector<StepLimit> step_limits(const Scenario& scenario);
 /// The limit with the least `chosen` (or `largest`) value.
 const StepLimit& binding_limit(const std::vector<StepLimit>& limits, bool of_largest = false);

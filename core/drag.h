@@ -1,6 +1,6 @@
-// Drag of a fluid on a grain: laws as small value types. Each returns K [N s/m, per metre of depth in
-// 2D], the force per slip speed: F = K (u - v), with u the fluid's interstitial velocity at the grain
-// and v the grain's. K is finite at zero slip; a new law adds no loop.
+// Drag of a fluid on a grain: laws as small value types. Each returns K [N s/m, per metre of depth
+// in 2D], the force per slip speed: F = K (u - v), with u the fluid's interstitial velocity at the
+// grain and v the grain's. K is finite at zero slip; a new law adds no loop.
 //
 // One form holds for all. With u_s = eps |u - v| the superficial slip, Re = rho0 u_s d / mu, A the
 // frontal area (pi d^2 / 4 of a sphere, d of a disc per metre of depth) and a swarm exponent chi,
@@ -58,8 +58,8 @@ inline double schiller_naumann(double re) {
   return viscous > newton ? viscous : newton;
 }
 
-/// Di Felice 1994: chi = 3.7 - 0.65 exp(-(1.5 - log10 Re)^2 / 2). Below Re = 1e-12 the bell is below
-/// 1e-39, so the floor changes no bit of chi; it only keeps log10 away from 0.
+/// Di Felice 1994: chi = 3.7 - 0.65 exp(-(1.5 - log10 Re)^2 / 2). Below Re = 1e-12 the bell is
+/// below 1e-39, so the floor changes no bit of chi; it only keeps log10 away from 0.
 inline double di_felice_exponent(double re) {
   const double distance = 1.5 - log10(re > 1e-12 ? re : 1e-12);
   return 3.7 - 0.65 * exp(-0.5 * distance * distance);
@@ -75,7 +75,8 @@ struct StokesDrag {
   }
 };
 
-/// Schiller-Naumann with Wen & Yu's swarm exponent 3.65: Gidaspow's dilute branch at every porosity.
+/// Schiller-Naumann with Wen & Yu's swarm exponent 3.65: Gidaspow's dilute branch at every
+/// porosity.
 template <int D>
 struct SchillerNaumannDrag {
   double operator()(const Slip& s) const {
@@ -97,9 +98,9 @@ struct DallaValleDiFeliceDrag {
   }
 };
 
-/// Gidaspow 1994: Ergun below porosity 0.8, Wen & Yu above; blended linearly over 0.78 to 0.82, since
-/// the plain switch jumps by 6 to 200 % and makes grains near it chatter. In the common form Ergun's
-/// F = V_sphere [150 (1-eps) mu / (eps d^2) + 1.75 rho0 |u_r| / d] u_r reads
+/// Gidaspow 1994: Ergun below porosity 0.8, Wen & Yu above; blended linearly over 0.78 to 0.82,
+/// since the plain switch jumps by 6 to 200 % and makes grains near it chatter. In the common form
+/// Ergun's F = V_sphere [150 (1-eps) mu / (eps d^2) + 1.75 rho0 |u_r| / d] u_r reads
 /// Cd Re eps^-chi = [200 (1-eps) + 7/3 Re] / eps^2.
 template <int D>
 struct GidaspowDrag {
@@ -117,8 +118,8 @@ struct GidaspowDrag {
 };
 
 /// Sucker & Brauer 1976, circular cylinder across the flow, 1e-4 < Re < 2e5:
-/// Cd = 1.18 + 6.8/Re^0.89 + 1.96/sqrt Re - 4e-4 Re / (1 + 3.64e-7 Re^2), with Di Felice's exponent.
-/// A cylinder has no linear regime: Cd Re, and K with it, goes to 0 at zero slip.
+/// Cd = 1.18 + 6.8/Re^0.89 + 1.96/sqrt Re - 4e-4 Re / (1 + 3.64e-7 Re^2), with Di Felice's
+/// exponent. A cylinder has no linear regime: Cd Re, and K with it, goes to 0 at zero slip.
 template <int D>
 struct CylinderDrag {
   static_assert(D == 2, "a cylinder across the flow is a disc");

@@ -8,8 +8,8 @@
 //                         sigma = 7/(478 pi), 1/(120 pi)                    (Morris, Fox & Zhu 1997)
 //
 // The slope is given as F = (dW/dr) / r, so that grad_a W_ab = F (r_a - r_b) without a division and
-// without a special case at r = 0. Beyond the support both are exactly 0, by max(0, .) rather than by a
-// branch, so that pair loops vectorise.
+// without a special case at r = 0. Beyond the support both are exactly 0, by max(0, .) rather than
+// by a branch, so that pair loops vectorise.
 #pragma once
 
 #include "core/math.h"

@@ -9,7 +9,8 @@ namespace {
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
 
-// ln 2 = high + low; high has 21 trailing zero bits, so that k * high is exact for every exponent k.
+// ln 2 = high + low; high has 21 trailing zero bits, so that k * high is exact for every exponent
+// k.
 constexpr double ln2_high = 0x1.62e42fee00000p-1;
 constexpr double ln2_low = 0x1.a39ef35793c76p-33;
 constexpr double ln2_lowest = 0x1.cc01f97b57a08p-87;
@@ -70,8 +71,8 @@ constexpr double scaled(double x, int k) {
   return x * power_of_two(k);
 }
 
-/// e^(x + tail), |tail| far below |x|. Reduction x = k ln 2 + r, |r| <= ln 2 / 2, then Taylor's series
-/// of e^r to r^14, summed so that only the last addition rounds at the size of the result.
+/// e^(x + tail), |tail| far below |x|. Reduction x = k ln 2 + r, |r| <= ln 2 / 2, then Taylor's
+/// series of e^r to r^14, summed so that only the last addition rounds at the size of the result.
 double exp_of_sum(double x, double tail) {
   if (x > 709.8) return infinity;
   if (x < -745.2) return 0;
@@ -97,7 +98,8 @@ double exp_of_sum(double x, double tail) {
 }
 
 /// ln x as a pair with a relative error below 2^-62, for finite x > 0.
-/// x = 2^k m with m in [sqrt(1/2), sqrt 2); ln m = 2 atanh s = 2 s + 2/3 s^3 + ..., s = (m-1)/(m+1).
+/// x = 2^k m with m in [sqrt(1/2), sqrt 2); ln m = 2 atanh s = 2 s + 2/3 s^3 + ..., s =
+/// (m-1)/(m+1).
 Pair log_pair(double x) {
   int k = 0;
   if (x < 0x1p-1022) {
@@ -141,8 +143,8 @@ bool log_is_special(double x, double& result) {
   return true;
 }
 
-/// Reduction x = quadrant pi/2 + r in four parts of pi/2, the first three of 33 bits or fewer, so that
-/// their products with the quadrant (17 bits) are exact; then Taylor's series on |r| <= pi/4.
+/// Reduction x = quadrant pi/2 + r in four parts of pi/2, the first three of 33 bits or fewer, so
+/// that their products with the quadrant (17 bits) are exact; then Taylor's series on |r| <= pi/4.
 struct Reduced {
   int quadrant;
   Pair r;

@@ -1,7 +1,8 @@
-// Elementary functions from + - * / sqrt and bit operations only, so that every compiler, libm and CPU
-// gives the same bits. Nothing in core/ calls the C library's exp, log, pow, sin or cos.
+// Elementary functions from + - * / sqrt and bit operations only, so that every compiler, libm and
+// CPU gives the same bits. Nothing in core/ calls the C library's exp, log, pow, sin or cos.
 //
-// Error bounds are in units in the last place of the exact result; the tests hold them against MPFR.
+// Error bounds are in units in the last place of the exact result; the tests hold them against
+// MPFR.
 #pragma once
 
 #include <cstdint>

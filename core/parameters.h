@@ -80,16 +80,16 @@ struct Problem {
 /// Returns what makes no sense (all of it); the scenario is usable only if that is empty.
 std::vector<Problem> resolve(Scenario& scenario);
 
-/// Changes keys of a resolved scenario by the fork rules: only keys that the table lets change, within
-/// the limits of the resolved values; derived numbers keep theirs. `anchor` as in ChangeOptions: -1
-/// keeps the left wall, +1 the right one, 0 moves both by half; domain.left follows. The scenario is
-/// unchanged if there is a problem.
+/// Changes keys of a resolved scenario by the fork rules: only keys that the table lets change,
+/// within the limits of the resolved values; derived numbers keep theirs. `anchor` as in
+/// ChangeOptions: -1 keeps the left wall, +1 the right one, 0 moves both by half; domain.left
+/// follows. The scenario is unchanged if there is a problem.
 std::vector<Problem> apply_settings(
     Scenario& scenario, const std::vector<std::pair<std::string, std::string>>& settings,
     int anchor = 0);
 
-/// Canonical text of a resolved scenario: sections, "key = value" lines, [event.NAME] sections. Reading
-/// it gives the same scenario to the bit.
+/// Canonical text of a resolved scenario: sections, "key = value" lines, [event.NAME] sections.
+/// Reading it gives the same scenario to the bit.
 std::string canonical_text(const Scenario& scenario);
 
 /// "fluid.viscosity=0.01" pairs of everything, resolved, in table order (events last).

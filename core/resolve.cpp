@@ -255,8 +255,8 @@ class Resolver {
       problem("time.until", number_text(s_.time.until) + " s is more than 1e15 steps");
   }
 
-  /// Walks through the scheduled changes as the run will: each is checked against the scenario as it
-  /// then stands, and a changed dt shifts the clock for those behind it.
+  /// Walks through the scheduled changes as the run will: each is checked against the scenario as
+  /// it then stands, and a changed dt shifts the clock for those behind it.
   void resolve_changes() {
     for (std::size_t i = 0; i < s_.changes.size(); ++i) check_schedule(s_.changes[i], i);
     if (!problems_.empty()) return;

@@ -104,8 +104,8 @@ struct Record {
   std::int64_t keyframe_steps = 256;
 };
 
-/// A change of fork-changeable keys at the end of a given step of the run. Either `at` or `at_step` is
-/// given; resolve() replaces `at` by the last step with time <= at + 1e-6 dt.
+/// A change of fork-changeable keys at the end of a given step of the run. Either `at` or `at_step`
+/// is given; resolve() replaces `at` by the last step with time <= at + 1e-6 dt.
 struct ScheduledChange {
   std::string name;
   double at = automatic;      // [s]; automatic once resolved

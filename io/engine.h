@@ -20,7 +20,8 @@ class Engine {
   /// Fields and tables; constant while the engine lives.
   virtual const Schema& schema() const = 0;
 
-  /// The state after the last completed step. Valid until the next advance(), restore() or change().
+  /// The state after the last completed step. Valid until the next advance(), restore() or
+  /// change().
   virtual FrameView frame() const = 0;
 
   /// What happened at the end of the last completed step (changes of parameters, particles added).

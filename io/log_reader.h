@@ -1,5 +1,6 @@
 // Reads a log: any step by index or by scan, needing no lock, while it is being written or after it
-// was torn or damaged. One state in memory at a time; memory does not grow with the number of steps.
+// was torn or damaged. One state in memory at a time; memory does not grow with the number of
+// steps.
 #pragma once
 
 #include <cstdint>
@@ -99,7 +100,8 @@ struct Recovery {
   std::vector<Damage> damage;
   bool lossy = false;
 };
-/// Writes everything whole in `input` to the new file `output`, verifies it, never touches the input.
+/// Writes everything whole in `input` to the new file `output`, verifies it, never touches the
+/// input.
 Recovery recover(const std::string& input, const std::string& output, bool overwrite = false,
                  FileSystem* files = nullptr);
 
