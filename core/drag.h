@@ -5,7 +5,8 @@
 // One form holds for all. With u_s = eps |u - v| the superficial slip, Re = rho0 u_s d / mu, A the
 // frontal area (pi d^2 / 4 of a sphere, d of a disc per metre of depth) and a swarm exponent chi,
 //
-//   F = 1/2 rho0 A Cd(Re) |u_s| u_s eps^-chi       =>   K = (A / d) mu eps / 2 * [Cd Re](Re) * eps^-chi
+//   F = 1/2 rho0 A Cd(Re) |u_s| u_s eps^-chi
+//   K = (A / d) mu eps / 2 * [Cd Re](Re) * eps^-chi
 //
 // (Di Felice 1994, and in the same form Wen & Yu 1966). Cd Re stays finite where Cd alone does not.
 // A disc uses a sphere's Cd on its own frontal area unless the law says otherwise.

@@ -15,8 +15,8 @@ namespace {
 
 using DoubleState = State<2, DoublePrecision>;
 
-// Draws of one id are told apart by number; grains use others than the fluid, since both may have the
-// same seed.
+// Draws of one id are told apart by number; grains use others than the fluid, since both may have
+// the same seed.
 constexpr std::uint64_t first_fluid_draw = 0, first_grain_draw = 16;
 
 void require_resolved(const Scenario& s) {
@@ -198,6 +198,7 @@ State<D, P> first_state(const Scenario& resolved) {
 template State<2, DoublePrecision> first_state<2, DoublePrecision>(const Scenario&);
 template State<2, FloatPrecision> first_state<2, FloatPrecision>(const Scenario&);
 template State<2, MixedPrecision> first_state<2, MixedPrecision>(const Scenario&);
+template State<2, DoublePrecision> converted<2, DoublePrecision>(const State<2, DoublePrecision>&);
 template State<2, DoublePrecision> converted<2, DoublePrecision>(const State<2, FloatPrecision>&);
 template State<2, DoublePrecision> converted<2, DoublePrecision>(const State<2, MixedPrecision>&);
 template State<2, FloatPrecision> converted<2, FloatPrecision>(const State<2, DoublePrecision>&);

@@ -1,8 +1,8 @@
 // Where the domain ends: the box, its wall planes and the lattice of dummy particles outside them.
 //
-// Walls are numbered 0 left, 1 right, 2 bottom, 3 top; contacts name them by that number. A side is a
-// wall if its boundary is no_slip or free_slip; periodic sides and a free top are none. The bottom lies
-// at y = 0, the left wall at domain.left. Coordinates in m.
+// Walls are numbered 0 left, 1 right, 2 bottom, 3 top; contacts name them by that number. A side is
+// a wall if its boundary is no_slip or free_slip; periodic sides and a free top are none. The
+// bottom lies at y = 0, the left wall at domain.left. Coordinates in m.
 #pragma once
 
 #include <array>
@@ -84,9 +84,9 @@ int fluid_dummy_layers(const Scenario& scenario);
 int coupling_dummy_layers(const Scenario& scenario);
 
 /// `layers` layers of dummies dx apart outside each wall, the first dx/2 outside, corners included,
-/// none beyond periodic sides or a free top. Side walls stand as high as the domain. Row by row from
-/// the bottom, each row from the left. Empty without fluid. Throws ModelError if the domain is not a
-/// whole number of spacings wide and high.
+/// none beyond periodic sides or a free top. Side walls stand as high as the domain. Row by row
+/// from the bottom, each row from the left. Empty without fluid. Throws ModelError if the domain is
+/// not a whole number of spacings wide and high.
 std::vector<WallDummy<2>> wall_dummies(const Scenario& scenario, int layers);
 
 /// length / spacing, which must be whole to 1e-6; otherwise throws ModelError naming `key` and the
