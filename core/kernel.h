@@ -4,8 +4,8 @@
 //                         sigma = 7/(4 pi) in 2D, 21/(16 pi) in 3D          (Wendland 1995)
 //   cubic (q <= 2)        f = 1 - 3/2 q^2 + 3/4 q^3 (q < 1), (2 - q)^3 / 4
 //                         sigma = 10/(7 pi), 1/pi                           (Monaghan 1992)
-//   quintic (q <= 3)      f = (3-q)^5 - 6 (2-q)^5 + 15 (1-q)^5, each term while its base is positive
-//                         sigma = 7/(478 pi), 1/(120 pi)                    (Morris, Fox & Zhu 1997)
+//   quintic (q <= 3)      f = (3-q)^5 - 6 (2-q)^5 + 15 (1-q)^5, terms with a positive base only
+//                         sigma = 7/(478 pi), 1/(120 pi)                   (Morris et al. 1997)
 //
 // The slope is given as F = (dW/dr) / r, so that grad_a W_ab = F (r_a - r_b) without a division and
 // without a special case at r = 0. Beyond the support both are exactly 0, by max(0, .) rather than
@@ -88,5 +88,13 @@ class SmoothingKernel {
 
   Real support_, inverse_h_, value_factor_, slope_factor_;
 };
+
+/// F = (dW/dr) / r of a kernel chosen at run time: for passes that are not hot.
+template <int D>
+double kernel_slope_of(Kernel kernel, double h, double r) {
+  if (kernel == Kernel::cubic) return SmoothingKernel<D, Kernel::cubic>(h).slope(r);
+  if (kernel == Kernel::quintic) return SmoothingKernel<D, Kernel::quintic>(h).slope(r);
+  return SmoothingKernel<D, Kernel::wendland_c2>(h).slope(r);
+}
 
 }  // namespace varve::core
