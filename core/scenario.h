@@ -19,6 +19,8 @@ enum class Drag { stokes, schiller_naumann, dallavalle_di_felice, gidaspow, cyli
 enum class Kernel { wendland_c2, cubic, quintic };
 enum class GrainMotion { free, frozen };
 enum class RecordTier { deltas, digests };
+/// What becomes of grains that a narrower width leaves outside.
+enum class OutsideMode { error, push, remove };
 
 /// "Not given: derive it" for a real parameter, until resolve() has replaced it.
 inline constexpr double automatic = std::numeric_limits<double>::quiet_NaN();
@@ -111,6 +113,8 @@ struct ScheduledChange {
   double at = automatic;      // [s]; automatic once resolved
   std::int64_t at_step = -1;  // -1: not given
   std::vector<std::pair<std::string, std::string>> settings;  // key, value as text
+  int anchor = 0;  // of a change of width: -1 the left wall stays, +1 the right one, 0 neither
+  OutsideMode outside = OutsideMode::error;  // likewise
 };
 
 struct Scenario {

@@ -91,8 +91,6 @@ struct Counters {
   std::vector<std::pair<std::string, std::uint64_t>> passes;  ///< how often each stage ran
 };
 
-enum class OutsideMode { error, push, remove };
-
 struct ChangeOptions {
   OutsideMode outside = OutsideMode::error;
   int anchor = 0;  ///< -1: the left wall stays, +1: the right wall stays, 0: both move by half
@@ -100,8 +98,37 @@ struct ChangeOptions {
 
 struct RunOptions {
   unsigned threads = 1;
-  /// Tests only: rebuild neighbour lists at every step / at pseudo-random steps.
+  /// Tests only: rebuild neighbour lists at pseudo-random steps chosen by this seed too.
   std::uint64_t rebuild_seed = 0;
+  /// Tests only: 0 baseline, 1 x86-64-v3, 2 x86-64-v4; -1 the widest that the processor has.
+  int instruction_set = -1;
+};
+
+/// Momentum of the last step, in N (N per m depth in 2D) where not said; D components each. Each sum is
+/// taken by a pass of its own, from the other side than the one that moved the particles: wall forces
+/// over the dummies, reactions over the fluid.
+struct StepLedger {
+  std::vector<double> fluid_momentum_change;  ///< [N s] sum m (v' - v)
+  std::vector<double> grain_momentum_change;  ///< [N s]
+  std::vector<double> walls_on_fluid;         ///< pressure and friction of the dummies
+  std::vector<double> walls_on_grains;        ///< mean of the contact forces over the step
+  std::vector<double> external_on_fluid;      ///< gravity (full form), body force
+  std::vector<double> external_on_grains;     ///< weight; the holding force of frozen grains
+  std::vector<double> grains_from_fluid;      ///< sum of hydrodynamic force and drag on grains
+  std::vector<double> fluid_from_grains;      ///< sum of the reactions on fluid particles
+  double force_scale = 0;                     ///< sum of |F| over all particles
+};
+
+/// What acted on one grain in the last step [N], [m/s], [-].
+struct GrainReport {
+  std::vector<double> hydrodynamic, drag, fluid_velocity;
+  double porosity = 1, shepard_sum = 0;
+};
+
+/// Fluid fields of the last step, by particle in ascending id.
+struct FluidReport {
+  std::vector<double> pressure;  ///< [Pa] as in the momentum equation: excess or full
+  std::vector<double> porosity;  ///< [-] never clamped
 };
 
 class Simulation {
@@ -137,11 +164,12 @@ class Simulation {
   virtual void change(const std::vector<std::pair<std::string, std::string>>& settings,
                       const ChangeOptions& options) = 0;
 
-  /// Forces on the state as it stands, by the engine's own pass (core/observe reads them).
-  struct WallForces {
-    std::vector<double> on_fluid;   ///< [N or N/m] D components: sum over dummies
-    std::vector<double> on_grains;  ///< by grain-wall contacts, mean over the sub-steps of the last step
-  };
+  /// Sums over the last step, each by a pass of its own; meaningful after advance().
+  virtual StepLedger ledger() const = 0;
+  /// Forces on each grain in the last step; empty without coupling.
+  virtual std::vector<GrainReport> grain_reports() const = 0;
+  /// Pressures and porosities of the fluid in the last step.
+  virtual FluidReport fluid_report() const = 0;
 };
 
 }  // namespace varve::core

@@ -1,0 +1,73 @@
+#include "core/constants.h"
+
+#include "core/criteria.h"
+#include "core/kernel.h"
+#include "core/math.h"
+
+namespace varve::core {
+
+namespace {
+
+template <int D>
+void set_grains(const Scenario& s, Constants<D>& c) {
+  const double d = s.grains.diameter;
+  c.diameter = d;
+  c.radius = 0.5 * d;
+  c.grain_volume = D == 2 ? 0.25 * pi * d * d : pi * d * d * d / 6;
+  c.grain_mass = s.grains.density * c.grain_volume;
+  c.grain_inertia = (D == 2 ? 0.5 : 0.4) * c.grain_mass * c.radius * c.radius;
+  c.frozen = s.grains.motion == GrainMotion::frozen;
+  // With hydrostatics taken out, the fluid's excess pressure does not carry a grain: its weight is
+  // the submerged one. In the full form the pressure gradient does, and Archimedes is not added.
+  const bool submerged = c.coupled && !c.full_pressure;
+  const double density = submerged ? s.grains.density - s.fluid.density : s.grains.density;
+  c.grain_weight = density * c.grain_volume * c.gravity;
+  c.stiffness = s.contact.stiffness;
+  c.tangential_stiffness = s.contact.tangential_ratio * s.contact.stiffness;
+  c.damping = s.contact.damping;
+  c.friction = s.contact.friction;
+  c.rotation = s.contact.rotation;
+  c.substeps = substeps(s);
+}
+
+}  // namespace
+
+template <int D>
+Constants<D> constants_of(const Scenario& s) {
+  Constants<D> c;
+  c.dt = s.time.dt;
+  c.coupled = s.is_coupled();
+  c.two_way = c.coupled && s.coupling.mode == CouplingMode::two_way;
+  c.full_pressure = s.fluid.pressure == PressureForm::full;
+  c.gravity[0] = s.gravity.magnitude * sin(s.gravity.tilt);
+  c.gravity[1] = -s.gravity.magnitude * cos(s.gravity.tilt);
+  if (s.domain.sides == Boundary::periodic) {
+    c.period.origin[0] = s.domain.left;
+    c.period.length[0] = s.domain.width;
+  }
+  if (s.domain.bottom == Boundary::periodic) c.period.length[1] = s.domain.height;
+  if (s.has_fluid()) {
+    c.spacing = s.fluid.spacing;
+    c.smoothing_length = s.fluid.smoothing_ratio * s.fluid.spacing;
+    c.support = support_ratio(s.fluid.kernel) * c.smoothing_length;
+    c.reference_density = s.fluid.density;
+    c.sound_speed = s.fluid.sound_speed;
+    c.viscosity = s.fluid.viscosity;
+    c.diffusion = s.fluid.density_diffusion;
+    if (c.full_pressure) c.fluid_acceleration = c.gravity;
+    c.fluid_acceleration[0] += s.fluid.body_force_x;
+    c.fluid_acceleration[1] += s.fluid.body_force_y;
+  }
+  if (s.has_grains()) set_grains(s, c);
+  if (c.coupled) {
+    c.coupling_length = s.coupling.length;
+    c.porosity_floor = s.coupling.porosity_floor;
+    c.exclude_own_volume = s.coupling.exclude_own_volume;
+    c.conservative_porosity = s.coupling.porosity == Porosity::conservative;
+  }
+  return c;
+}
+
+template Constants<2> constants_of<2>(const Scenario&);
+
+}  // namespace varve::core

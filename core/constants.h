@@ -1,0 +1,50 @@
+// The numbers a step uses, computed once from a resolved scenario. Nothing here is state.
+#pragma once
+
+#include <cstdint>
+
+#include "core/neighbors.h"
+#include "core/scenario.h"
+#include "core/state.h"
+
+namespace varve::core {
+
+template <int D>
+struct Constants {
+  // fluid
+  double smoothing_length = 0;   // [m] h
+  double support = 0;            // [m] kernel radius
+  double reference_density = 0;  // [kg/m3] rho0
+  double sound_speed = 0;        // [m/s] c0
+  double viscosity = 0;          // [Pa s] mu
+  double diffusion = 0;          // [-] delta
+  double spacing = 0;            // [m] dx
+  bool full_pressure = false;
+  Vec<double, D> gravity = Vec<double, D>::Zero();           // [m/s2]
+  Vec<double, D> fluid_acceleration = Vec<double, D>::Zero();  // gravity (full form) and body force
+  // grains
+  double diameter = 0, radius = 0;           // [m]
+  double grain_volume = 0, grain_mass = 0;   // [m3], [kg] (m2 and kg/m in 2D)
+  double grain_inertia = 0;                  // [kg m2] 1/2 m R^2 disc, 2/5 m R^2 sphere
+  Vec<double, D> grain_weight = Vec<double, D>::Zero();  // [N] submerged in the excess form
+  bool frozen = false;
+  // contact
+  double stiffness = 0, tangential_stiffness = 0;  // [N/m]
+  double damping = 0, friction = 0;                // [-]
+  bool rotation = false;
+  std::int64_t substeps = 1;
+  // coupling
+  bool coupled = false, two_way = false;
+  double coupling_length = 0;  // [m] hc
+  double porosity_floor = 0;
+  bool exclude_own_volume = true;
+  bool conservative_porosity = false;
+
+  double dt = 0;
+  Periodicity<D> period;
+};
+
+template <int D>
+Constants<D> constants_of(const Scenario& resolved);
+
+}  // namespace varve::core

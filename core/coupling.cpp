@@ -1,0 +1,200 @@
+#include "core/coupling.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/kernel.h"
+
+namespace varve::core {
+
+namespace {
+template <int D>
+using CouplingKernel = SmoothingKernel<D, Kernel::wendland_c2, double>;
+}  // namespace
+
+template <int D, class P>
+double CouplingStage<D, P>::separation(const Constants<D>& c, const Vec<Position, D>& a,
+                                  const Vec<Position, D>& b) const {
+  double r2 = 0;
+  for (int k = 0; k < D; ++k) {
+    double d = static_cast<double>(a[k]) - static_cast<double>(b[k]);
+    const double length = c.period.length[k];
+    if (d > 0.5 * length) d -= length;
+    if (d < -0.5 * length) d += length;
+    r2 += d * d;
+  }
+  return std::sqrt(r2);
+}
+
+template <int D, class P>
+bool CouplingStage<D, P>::stale(const Constants<D>& c, const State<D, P>& state,
+                                double skin) const {
+  // The fluid's own lists watch the fluid with the same skin and are rebuilt together with these.
+  if (listed_at_.size() != state.grains.size() || listed_fluid_ != state.fluid.size()) return true;
+  for (std::size_t i = 0; i < listed_at_.size(); ++i)
+    if (!(separation(c, state.grains.position[i], listed_at_[i]) < 0.5 * skin)) return true;
+  return false;
+}
+
+template <int D, class P>
+void CouplingStage<D, P>::rebuild(const Constants<D>& c, const State<D, P>& state,
+                             std::span<const Vec<Position, D>> walls, double skin,
+                             Workers& workers) {
+  const double radius = 2 * c.coupling_length + skin;
+  const std::span<const Vec<Position, D>> grains(state.grains.position);
+  const std::span<const Vec<Position, D>> fluid(state.fluid.position);
+  // The coupling's support is wider than the fluid's: cells of its own, or Rc would be cut short.
+  CellGrid<D, Position> cells;
+  cells.build(fluid, radius, c.period);
+  fluid_of_ = candidates<D, Position>(grains, fluid, cells, radius, c.period, false, workers);
+  cells.build(walls, radius, c.period);
+  walls_of_ = candidates<D, Position>(grains, walls, cells, radius, c.period, false, workers);
+  cells.build(grains, radius, c.period);
+  grains_of_ = candidates<D, Position>(grains, grains, cells, radius, c.period, true, workers);
+  weights_.assign(fluid_of_.index.size(), 0);
+  near_start_.assign(fluid.size() + 1, 0);
+  for (const std::int32_t a : fluid_of_.index) ++near_start_[static_cast<std::size_t>(a) + 1];
+  for (std::size_t a = 0; a < fluid.size(); ++a) near_start_[a + 1] += near_start_[a];
+  near_.resize(fluid_of_.index.size());
+  std::vector<std::uint32_t> next(near_start_.begin(), near_start_.end() - 1);
+  for (std::size_t i = 0; i < grains.size(); ++i)
+    for (std::uint32_t slot = fluid_of_.start[i]; slot < fluid_of_.start[i + 1]; ++slot)
+      near_[next[static_cast<std::size_t>(fluid_of_.index[slot])]++] = {
+          static_cast<std::uint32_t>(i), slot};
+  listed_at_.assign(grains.begin(), grains.end());
+  listed_fluid_ = fluid.size();
+  forces_.assign(grains.size(), {});
+  spread_volume_.assign(grains.size(), 0);
+  reaction_per_weight_.assign(grains.size(), Vec<double, D>::Zero());
+}
+
+template <int D, class P>
+void CouplingStage<D, P>::compute_weights(const Constants<D>& c, const State<D, P>& state,
+                                     std::span<const Vec<Position, D>> fluid, Workers& workers) {
+  const CouplingKernel<D> kernel(c.coupling_length);
+  workers.run(state.grains.size(), 1, [&](std::size_t begin, std::size_t end, unsigned) {
+    for (std::size_t i = begin; i < end; ++i)
+      for (std::uint32_t slot = fluid_of_.start[i]; slot < fluid_of_.start[i + 1]; ++slot) {
+        const auto a = static_cast<std::size_t>(fluid_of_.index[slot]);
+        weights_[slot] = kernel.value(separation(c, fluid[a], state.grains.position[i]));
+      }
+  });
+}
+
+template <int D, class P>
+void CouplingStage<D, P>::porosity(const Constants<D>& c, const State<D, P>& state,
+                              std::span<const Real> volume_before,
+                              std::span<const Vec<Position, D>> walls, double wall_volume,
+                              std::span<Real> porosity, std::span<Real> floored,
+                              Workers& workers) {
+  const CouplingKernel<D> kernel(c.coupling_length);
+  compute_weights(c, state, state.fluid.position, workers);
+  workers.run(state.grains.size(), 1, [&](std::size_t begin, std::size_t end, unsigned) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const auto dummies = walls_of_.of(i);
+      spread_volume_[i] = c.grain_volume;
+      double of_walls = 0;
+      for (const std::int32_t w : dummies)
+        of_walls += wall_volume * kernel.value(separation(c, walls[static_cast<std::size_t>(w)],
+                                                          state.grains.position[i]));
+      if (of_walls == 0 && !c.conservative_porosity) continue;
+      double of_fluid = 0;
+      for (std::uint32_t slot = fluid_of_.start[i]; slot < fluid_of_.start[i + 1]; ++slot)
+        of_fluid += static_cast<double>(
+                        volume_before[static_cast<std::size_t>(fluid_of_.index[slot])]) *
+                    weights_[slot];
+      if (of_fluid <= 0) continue;
+      const double whole = c.conservative_porosity ? 1.0 : of_fluid + of_walls;
+      spread_volume_[i] = c.grain_volume * whole / of_fluid;
+    }
+  });
+  // Clamps are counted per fluid particle and added up in one fixed order; integers have no order.
+  std::vector<std::uint64_t> clamps(workers.count(), 0);
+  workers.run(state.fluid.size(), 64, [&](std::size_t begin, std::size_t end, unsigned thread) {
+    for (std::size_t a = begin; a < end; ++a) {
+      double solid = 0;
+      for (std::uint32_t k = near_start_[a]; k < near_start_[a + 1]; ++k)
+        solid += spread_volume_[near_[k].grain] * weights_[near_[k].slot];
+      const double eps = 1 - solid;
+      porosity[a] = static_cast<Real>(eps);
+      floored[a] = static_cast<Real>(std::max(eps, c.porosity_floor));
+      if (eps < c.porosity_floor) ++clamps[thread];
+    }
+  });
+  fluid_clamps_ = 0;
+  for (const std::uint64_t each : clamps) fluid_clamps_ += each;
+}
+
+/// Porosity at grain i from the other grains, normalised so that a packed array still sees its
+/// neighbours: eps_i = 1 - sum_{j != i} V_j W_ij / (1 - V_i W(0)).
+template <int D, class P>
+double CouplingStage<D, P>::others_porosity(const Constants<D>& c, const State<D, P>& state,
+                                       std::size_t i) const {
+  const CouplingKernel<D> kernel(c.coupling_length);
+  double solid = 0;
+  for (const std::int32_t j : grains_of_.of(i))
+    solid += c.grain_volume * kernel.value(separation(c, state.grains.position[i],
+                                                      state.grains.position[static_cast<std::size_t>(j)]));
+  const double own = c.grain_volume * kernel.value(0);
+  return c.exclude_own_volume ? 1 - solid / (1 - own) : 1 - (solid + own);
+}
+
+template <int D, class P>
+GrainForce<D> CouplingStage<D, P>::force_on(const Constants<D>& c, const State<D, P>& state,
+                                       const FluidView<D, P>& fluid, const DragLaw<D>& law,
+                                       std::size_t i) const {
+  GrainForce<D> f;
+  Vec<double, D> stress = Vec<double, D>::Zero(), velocity = Vec<double, D>::Zero();
+  for (std::uint32_t slot = fluid_of_.start[i]; slot < fluid_of_.start[i + 1]; ++slot) {
+    const auto a = static_cast<std::size_t>(fluid_of_.index[slot]);
+    const double volume_weight = static_cast<double>(fluid.volume[a]) * weights_[slot];
+    f.weight += volume_weight;
+    velocity += volume_weight * fluid.velocity[a].template cast<double>();
+    stress += weights_[slot] * fluid.stress_force[a].template cast<double>();
+  }
+  const double eps = others_porosity(c, state, i);
+  f.porosity = std::max(eps, c.porosity_floor);
+  // A grain that has left the fluid feels none of it.
+  if (f.weight <= 0) return f;
+  f.fluid_velocity = velocity / f.weight;
+  f.hydrodynamic = c.grain_volume * stress / f.weight;
+  const Vec<double, D> v = state.grains.velocity[i].template cast<double>();
+  const Vec<double, D> slip = f.fluid_velocity - v;
+  double speed2 = 0;
+  for (int k = 0; k < D; ++k) speed2 += slip[k] * slip[k];
+  const Slip argument{std::sqrt(speed2), f.porosity, c.diameter, c.reference_density, c.viscosity};
+  f.coefficient = drag_coefficient<D>(law, argument);
+  // v* = (v + dt/m (F_hyd + W + K u)) / (1 + dt K / m): unconditionally stable, and the force that
+  // belongs to it is the one that the fluid loses.
+  const double per_mass = c.dt / c.grain_mass;
+  const Vec<double, D> moved =
+      (v + per_mass * (f.hydrodynamic + c.grain_weight + f.coefficient * f.fluid_velocity)) /
+      (1 + per_mass * f.coefficient);
+  f.drag = f.coefficient * (f.fluid_velocity - (c.frozen ? v : moved));
+  return f;
+}
+
+template <int D, class P>
+void CouplingStage<D, P>::forces(const Constants<D>& c, const State<D, P>& state,
+                            const FluidView<D, P>& fluid, const DragLaw<D>& law,
+                            Workers& workers) {
+  if (!c.two_way) compute_weights(c, state, fluid.position, workers);
+  workers.run(state.grains.size(), 1, [&](std::size_t begin, std::size_t end, unsigned) {
+    for (std::size_t i = begin; i < end; ++i) {
+      forces_[i] = force_on(c, state, fluid, law, i);
+      const GrainForce<D>& f = forces_[i];
+      reaction_per_weight_[i] = f.weight > 0
+                                    ? Vec<double, D>(-(f.hydrodynamic + f.drag) / f.weight)
+                                    : Vec<double, D>(Vec<double, D>::Zero());
+    }
+  });
+  grain_clamps_ = weak_ = 0;
+  for (const GrainForce<D>& f : forces_) {
+    if (f.porosity <= c.porosity_floor) ++grain_clamps_;
+    if (f.weight < 0.5) ++weak_;
+  }
+}
+
+template class CouplingStage<2, DoublePrecision>;
+
+}  // namespace varve::core

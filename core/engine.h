@@ -1,0 +1,127 @@
+// The engine itself, for one dimension and one precision. advance() reads like the method section of
+// a paper; core/PHYSICS.md is that section.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/constants.h"
+#include "core/contacts.h"
+#include "core/coupling.h"
+#include "core/drag.h"
+#include "core/fluid_lists.h"
+#include "core/geometry_change.h"
+#include "core/pair_sweeps.h"
+#include "core/simulation.h"
+#include "core/state.h"
+#include "core/walls.h"
+#include "core/workers.h"
+
+namespace varve::core {
+
+template <int D, class P>
+class Engine final : public Simulation {
+ public:
+  using Real = typename P::Real;
+  using Position = typename P::Position;
+
+  Engine(const Scenario& scenario, State<D, P> state, const RunOptions& options);
+
+  const std::vector<FieldInfo>& fields() const override { return fields_; }
+  FieldSpan field(std::size_t index) const override { return spans_[index]; }
+  const std::vector<TableInfo>& tables() const override { return tables_; }
+  TableSpan table(std::size_t index) const override;
+  Clock clock() const override {
+    return {state_.clock.step, state_.clock.time, state_.clock.dt};
+  }
+  const Scenario& scenario() const override { return scenario_; }
+  const std::vector<Happening>& happenings() const override { return happenings_; }
+  const Counters& counters() const override;
+  StepLedger ledger() const override;
+  std::vector<GrainReport> grain_reports() const override;
+  FluidReport fluid_report() const override;
+
+  void advance() override;
+  void set_state(std::span<const FieldSpan> values) override;
+  void change(const std::vector<std::pair<std::string, std::string>>& settings,
+              const ChangeOptions& options) override;
+  void apply_scheduled();
+  /// Takes changes scheduled up to the present step as done: keys only, the state has them already.
+  void skip_scheduled();
+
+ private:
+  /// Derived arrays, rebuilt by the same code at every step. Fluid arrays have one entry per particle,
+  /// dummy arrays one more than there are dummies: a padding point that weighs nothing.
+  struct Work {
+    std::vector<Real> porosity, floored_porosity, volume_before, density_before, volume, pressure;
+    std::vector<Vec<Real, D>> stress_force;
+    std::vector<Vec<Position, D>> wall_position;
+    std::vector<Vec<Real, D>> wall_own_velocity, wall_velocity;
+    std::vector<Real> wall_volume, wall_viscous_volume, wall_pressure;
+    std::size_t wall_count = 0;
+    std::vector<Vec<Position, D>> coupling_wall_position;
+    std::vector<Vec<double, D>> grain_force;
+  };
+
+  void build_fields();
+  void build_tables();
+  void check_counts(const State<D, P>& state) const;
+  void refresh_spans();
+  void adopt_scenario();  // constants, walls and lists from scenario_
+  void build_walls();
+  SweepData<D, P> sweep_data();
+
+  // The stages of a step, in order.
+  void update_lists();
+  void find_porosity();
+  void prepare_fluid();
+  void find_density_and_pressure();
+  void find_wall_values();
+  void find_stresses();
+  void find_grain_forces();
+  void move_grains();
+  void move_fluid();
+  void check_grains() const;
+  void commit();
+  void record_tables();
+
+  std::size_t move_fluid_part(std::size_t begin, std::size_t end);
+  bool fluid_is_good(std::size_t a) const;
+  [[noreturn]] void report_fluid(std::size_t a) const;
+  void wrap(Vec<Position, D>& x) const;
+  double density_deviation(std::size_t a) const;
+  double beyond_walls(const Vec<Position, D>& x) const;
+  static void describe(const GeometryReport& report, std::vector<Happening>& happenings);
+  static ChangeOptions scheduled_options(const ScheduledChange& scheduled);
+  Vec<double, D> walls_on_fluid() const;
+  void count_pass(std::size_t pass) { ++counters_.passes[pass].second; }
+
+  Scenario scenario_;
+  Constants<D> c_;
+  State<D, P> state_, next_;  // next_ holds the state before the last step once that is committed
+  Work work_;
+  Workers workers_;
+  PairSweeps<D, P> sweeps_;
+  InstructionSet instruction_set_;
+  FluidLists<D, Position> lists_;
+  CouplingStage<D, P> coupling_;
+  Contacts<D, P> contacts_;
+  DragLaw<D> drag_law_;
+  std::vector<WallPlane> planes_;
+  RunOptions options_;
+
+  std::vector<FieldInfo> fields_;
+  std::vector<FieldSpan> spans_;
+  std::vector<TableInfo> tables_;
+  std::vector<std::vector<std::vector<std::byte>>> table_bytes_;
+  std::vector<std::uint64_t> table_rows_;
+  std::vector<std::uint64_t> step_numbers_;  // clock as recorded: step, n_s
+  std::vector<double> step_times_;           // time, dt, t_s
+  std::vector<Happening> happenings_;
+  mutable Counters counters_;
+  double drag_work_ = 0, hydrodynamic_work_ = 0;
+};
+
+}  // namespace varve::core

@@ -1,0 +1,344 @@
+// The step of Engine: one stage after the other.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/engine.h"
+
+namespace varve::core {
+
+namespace engine_detail {
+
+/// Names of the stages as Counters reports them; a stage that a scene does not need never runs.
+enum Pass : std::size_t {
+  pass_lists, pass_porosity, pass_density, pass_walls, pass_stress, pass_grain_forces,
+  pass_contacts, pass_fluid, pass_reaction, pass_count
+};
+inline constexpr const char* pass_names[pass_count] = {
+    "lists", "porosity", "density", "walls", "stress", "grain_forces",
+    "contacts", "fluid", "reaction"};
+
+/// The skin of the lists over the smoothing length: small enough for short lists, large enough that
+/// they live for several steps at CFL 0.25. It reaches no bit.
+inline constexpr double skin_ratio = 0.25;
+
+inline constexpr std::size_t nobody = std::numeric_limits<std::size_t>::max();
+
+}  // namespace engine_detail
+
+/// Semi-implicit Euler in two sweeps: superficial density from x(n), v(n); then pressure from it, all
+/// forces, v += dt a, x += dt v. One force evaluation per step.
+template <int D, class P>
+void Engine<D, P>::advance() {
+  happenings_.clear();
+  if (scenario_.has_fluid()) {
+    update_lists();
+    if (c_.two_way) find_porosity();
+    prepare_fluid();
+    find_density_and_pressure();
+    if (work_.wall_count > 0) find_wall_values();
+    find_stresses();
+  }
+  if (c_.coupled) find_grain_forces();
+  if (scenario_.has_grains()) move_grains();
+  if (scenario_.has_fluid()) move_fluid();
+  commit();
+  record_tables();
+  refresh_spans();
+  apply_scheduled();
+}
+
+template <int D, class P>
+void Engine<D, P>::update_lists() {
+  const double skin = engine_detail::skin_ratio * c_.smoothing_length;
+  bool stale = lists_.stale(state_.fluid.position, skin, workers_);
+  if (c_.coupled) stale = stale || coupling_.stale(c_, state_, skin);
+  if (options_.rebuild_seed != 0 &&
+      random_bits(options_.rebuild_seed, state_.clock.step, 0) % 3 == 0)
+    stale = true;
+  if (!stale) return;
+  lists_.rebuild(state_.fluid.position,
+                 std::span(work_.wall_position.data(), work_.wall_count), c_.support, skin,
+                 c_.period, workers_);
+  if (c_.coupled)
+    coupling_.rebuild(c_, state_, work_.coupling_wall_position, skin, workers_);
+  ++counters_.list_rebuilds;
+  count_pass(engine_detail::pass_lists);
+}
+
+template <int D, class P>
+void Engine<D, P>::find_porosity() {
+  const std::size_t n = state_.fluid.size();
+  workers_.run(n, 256, [&](std::size_t begin, std::size_t end, unsigned) {
+    for (std::size_t a = begin; a < end; ++a)
+      work_.volume_before[a] = state_.fluid.mass[a] / state_.fluid.superficial_density[a];
+  });
+  const double dummy_volume = integer_power<D>(c_.spacing);
+  coupling_.porosity(c_, state_, work_.volume_before, work_.coupling_wall_position, dummy_volume,
+                     work_.porosity, work_.floored_porosity, workers_);
+  counters_.porosity_clamps += coupling_.fluid_clamps();
+  count_pass(engine_detail::pass_porosity);
+}
+
+template <int D, class P>
+void Engine<D, P>::prepare_fluid() {
+  workers_.run(state_.fluid.size(), 256, [&](std::size_t begin, std::size_t end, unsigned) {
+    for (std::size_t a = begin; a < end; ++a) {
+      const Real rhob = state_.fluid.superficial_density[a];
+      work_.volume_before[a] = state_.fluid.mass[a] / rhob;
+      work_.density_before[a] = c_.two_way ? rhob / work_.floored_porosity[a] : rhob;
+    }
+  });
+}
+
+template <int D, class P>
+SweepData<D, P> Engine<D, P>::sweep_data() {
+  SweepData<D, P> s;
+  s.count = state_.fluid.size();
+  s.position = reinterpret_cast<const Position*>(state_.fluid.position.data());
+  s.velocity = reinterpret_cast<const Real*>(state_.fluid.velocity.data());
+  s.mass = state_.fluid.mass.data();
+  s.superficial_density = state_.fluid.superficial_density.data();
+  s.porosity = c_.two_way ? work_.floored_porosity.data() : nullptr;
+  s.volume_before = work_.volume_before.data();
+  s.density_before = work_.density_before.data();
+  s.fluid = lists_.fluid();
+  s.walls = lists_.walls();
+  s.of_walls = lists_.of_walls();
+  s.wall_count = work_.wall_count;
+  s.wall_position = reinterpret_cast<const Position*>(work_.wall_position.data());
+  s.wall_own_velocity = reinterpret_cast<const Real*>(work_.wall_own_velocity.data());
+  s.wall_volume = work_.wall_volume.data();
+  s.wall_viscous_volume = work_.wall_viscous_volume.data();
+  s.superficial_density_next = next_.fluid.superficial_density.data();
+  s.volume = work_.volume.data();
+  s.pressure = work_.pressure.data();
+  s.wall_pressure = work_.wall_pressure.data();
+  s.wall_velocity = reinterpret_cast<Real*>(work_.wall_velocity.data());
+  s.stress_force = reinterpret_cast<Real*>(work_.stress_force.data());
+  s.smoothing_length = static_cast<Real>(c_.smoothing_length);
+  s.dt = static_cast<Real>(c_.dt);
+  s.reference_density = static_cast<Real>(c_.reference_density);
+  s.sound_speed = static_cast<Real>(c_.sound_speed);
+  s.viscosity = static_cast<Real>(c_.viscosity);
+  s.diffusion = static_cast<Real>(c_.diffusion);
+  for (int k = 0; k < D; ++k) {
+    s.gravity[k] = static_cast<Real>(c_.fluid_acceleration[k]);
+    // Fluid at rest in the full form has grad rho = rho0 g / c0^2; diffusion acts on what is left.
+    s.hydrostatic_gradient[k] =
+        c_.full_pressure ? static_cast<Real>(c_.reference_density * c_.gravity[k] /
+                                             (c_.sound_speed * c_.sound_speed))
+                         : Real(0);
+    s.period[k] = static_cast<Position>(c_.period.length[k]);
+  }
+  return s;
+}
+
+template <int D, class P>
+void Engine<D, P>::find_density_and_pressure() {
+  const SweepData<D, P> data = sweep_data();
+  workers_.run((data.count + lanes - 1) / lanes, 4,
+               [&](std::size_t begin, std::size_t end, unsigned) {
+                 sweeps_.density(data, begin, end);
+               });
+  count_pass(engine_detail::pass_density);
+}
+
+template <int D, class P>
+void Engine<D, P>::find_wall_values() {
+  const SweepData<D, P> data = sweep_data();
+  workers_.run((data.wall_count + lanes - 1) / lanes, 4,
+               [&](std::size_t begin, std::size_t end, unsigned) {
+                 sweeps_.extrapolate(data, begin, end);
+               });
+  count_pass(engine_detail::pass_walls);
+}
+
+template <int D, class P>
+void Engine<D, P>::find_stresses() {
+  const SweepData<D, P> data = sweep_data();
+  workers_.run((data.count + lanes - 1) / lanes, 4,
+               [&](std::size_t begin, std::size_t end, unsigned) {
+                 sweeps_.stress(data, begin, end);
+               });
+  count_pass(engine_detail::pass_stress);
+}
+
+template <int D, class P>
+void Engine<D, P>::find_grain_forces() {
+  const FluidView<D, P> fluid{state_.fluid.position, state_.fluid.velocity, work_.volume,
+                              work_.stress_force};
+  coupling_.forces(c_, state_, fluid, drag_law_, workers_);
+  counters_.drag_porosity_clamps += coupling_.grain_clamps();
+  counters_.weak_coupling += coupling_.weak_grains();
+  count_pass(engine_detail::pass_grain_forces);
+}
+
+template <int D, class P>
+void Engine<D, P>::move_grains() {
+  next_.grains = state_.grains;
+  next_.contacts = state_.contacts;
+  drag_work_ = hydrodynamic_work_ = 0;
+  if (c_.frozen) return;
+  work_.grain_force.resize(state_.grains.size());
+  for (std::size_t i = 0; i < state_.grains.size(); ++i) {
+    work_.grain_force[i] = c_.grain_weight;
+    if (c_.coupled) {
+      const GrainForce<D>& f = coupling_.grain_forces()[i];
+      work_.grain_force[i] += f.hydrodynamic + f.drag;
+    }
+  }
+  contacts_.advance(c_, work_.grain_force, planes_, scenario_.guards.overlap * c_.diameter,
+                    state_.clock.step + 1, next_.grains, next_.contacts);
+  counters_.grain_substeps += static_cast<std::uint64_t>(c_.substeps);
+  count_pass(engine_detail::pass_contacts);
+  if (c_.coupled)
+    for (std::size_t i = 0; i < state_.grains.size(); ++i) {
+      const GrainForce<D>& f = coupling_.grain_forces()[i];
+      for (int k = 0; k < D; ++k) {
+        const double moved = static_cast<double>(next_.grains.position[i][k]) -
+                             static_cast<double>(state_.grains.position[i][k]);
+        drag_work_ += f.drag[k] * moved;
+        hydrodynamic_work_ += f.hydrodynamic[k] * moved;
+      }
+    }
+  for (auto& x : next_.grains.position) wrap(x);
+  check_grains();
+}
+
+template <int D, class P>
+void Engine<D, P>::wrap(Vec<Position, D>& x) const {
+  for (int k = 0; k < D; ++k) {
+    const auto length = static_cast<Position>(c_.period.length[k]);
+    const auto low = static_cast<Position>(c_.period.origin[k]);
+    if (!(length > 0)) continue;
+    if (x[k] < low) x[k] += length;
+    // Not else: a point just below the seam may round onto it.
+    if (x[k] >= low + length) x[k] -= length;
+  }
+}
+
+template <int D, class P>
+void Engine<D, P>::check_grains() const {
+  // Without fluid there is no sound speed: a grain that crosses itself within a sub-step has failed.
+  const double limit = scenario_.has_fluid()
+                           ? scenario_.guards.speed * c_.sound_speed
+                           : c_.diameter * static_cast<double>(c_.substeps) / c_.dt;
+  for (std::size_t i = 0; i < next_.grains.size(); ++i) {
+    double speed2 = 0, place = 0;
+    for (int k = 0; k < D; ++k) {
+      const auto v = static_cast<double>(next_.grains.velocity[i][k]);
+      speed2 += v * v;
+      place += static_cast<double>(next_.grains.position[i][k]);
+    }
+    if (speed2 <= limit * limit && std::isfinite(place)) continue;
+    throw NumericalFailure("grain speed", state_.clock.step + 1, "grains.velocity",
+                           next_.grains.id[i], std::sqrt(speed2), limit,
+                           "lower time.dt or contact.stiffness, or raise fluid.sound_speed");
+  }
+}
+
+/// v += dt a, x += dt v for particles [begin, end); returns the first one that a guard stops.
+template <int D, class P>
+std::size_t Engine<D, P>::move_fluid_part(std::size_t begin, std::size_t end) {
+  const Real dt = static_cast<Real>(c_.dt);
+  const Position dt_position = static_cast<Position>(c_.dt);
+  const Vec<Real, D> outside = c_.fluid_acceleration.template cast<Real>();
+  std::size_t first_bad = engine_detail::nobody;
+  for (std::size_t a = begin; a < end; ++a) {
+    Vec<Real, D> force = work_.stress_force[a];
+    if (c_.two_way)
+      force += coupling_.reaction(a, static_cast<double>(work_.volume[a])).template cast<Real>();
+    const Vec<Real, D> acceleration = force / state_.fluid.mass[a] + outside;
+    Vec<Real, D>& v = next_.fluid.velocity[a];
+    Vec<Position, D>& x = next_.fluid.position[a];
+    v = state_.fluid.velocity[a] + dt * acceleration;
+    x = state_.fluid.position[a] + dt_position * v.template cast<Position>();
+    wrap(x);
+    if (first_bad == engine_detail::nobody && !fluid_is_good(a)) first_bad = a;
+  }
+  return first_bad;
+}
+
+template <int D, class P>
+void Engine<D, P>::move_fluid() {
+  std::vector<std::size_t> bad(workers_.count(), engine_detail::nobody);
+  workers_.run(state_.fluid.size(), 64, [&](std::size_t begin, std::size_t end, unsigned thread) {
+    bad[thread] = move_fluid_part(begin, end);
+  });
+  count_pass(engine_detail::pass_fluid);
+  if (c_.two_way) count_pass(engine_detail::pass_reaction);
+  const std::size_t first = *std::min_element(bad.begin(), bad.end());
+  if (first != engine_detail::nobody) report_fluid(first);
+}
+
+template <int D, class P>
+double Engine<D, P>::density_deviation(std::size_t a) const {
+  const double eps = c_.two_way ? static_cast<double>(work_.floored_porosity[a]) : 1.0;
+  return static_cast<double>(next_.fluid.superficial_density[a]) / eps / c_.reference_density - 1;
+}
+
+/// How far a particle has gone through a wall [m]; negative inside.
+template <int D, class P>
+double Engine<D, P>::beyond_walls(const Vec<Position, D>& x) const {
+  double beyond = -std::numeric_limits<double>::infinity();
+  for (const WallPlane& plane : planes_)
+    beyond = std::max(beyond, -plane.inward * (static_cast<double>(x[plane.axis]) - plane.at));
+  return beyond;
+}
+
+template <int D, class P>
+bool Engine<D, P>::fluid_is_good(std::size_t a) const {
+  double speed2 = 0;
+  for (int k = 0; k < D; ++k) {
+    const auto v = static_cast<double>(next_.fluid.velocity[a][k]);
+    speed2 += v * v;
+  }
+  const double limit = scenario_.guards.speed * c_.sound_speed;
+  // Written so that a NaN fails too.
+  return speed2 <= limit * limit &&
+         std::abs(density_deviation(a)) <= scenario_.guards.density_deviation &&
+         !(beyond_walls(next_.fluid.position[a]) > c_.spacing);
+}
+
+template <int D, class P>
+void Engine<D, P>::report_fluid(std::size_t a) const {
+  const std::uint64_t step = state_.clock.step + 1, id = state_.fluid.id[a];
+  const double deviation = density_deviation(a);
+  if (!(std::abs(deviation) <= scenario_.guards.density_deviation))
+    throw NumericalFailure("density deviation", step, "fluid.superficial_density", id, deviation,
+                           scenario_.guards.density_deviation,
+                           "lower time.cfl, raise coupling.porosity_floor or fluid.sound_speed");
+  double speed2 = 0;
+  for (int k = 0; k < D; ++k) {
+    const auto v = static_cast<double>(next_.fluid.velocity[a][k]);
+    speed2 += v * v;
+  }
+  const double limit = scenario_.guards.speed * c_.sound_speed;
+  if (!(speed2 <= limit * limit))
+    throw NumericalFailure("fluid speed", step, "fluid.velocity", id, std::sqrt(speed2), limit,
+                           "lower time.cfl or raise fluid.sound_speed");
+  throw NumericalFailure("fluid beyond a wall", step, "fluid.position", id,
+                         beyond_walls(next_.fluid.position[a]), c_.spacing,
+                         "lower time.cfl or raise fluid.sound_speed");
+}
+
+template <int D, class P>
+void Engine<D, P>::commit() {
+  ClockState& clock = state_.clock;
+  ++clock.step;
+  clock.time = clock.since_time + static_cast<double>(clock.step - clock.since_step) * clock.dt;
+  if (scenario_.has_fluid()) {
+    std::swap(state_.fluid.position, next_.fluid.position);
+    std::swap(state_.fluid.velocity, next_.fluid.velocity);
+    std::swap(state_.fluid.superficial_density, next_.fluid.superficial_density);
+  }
+  if (scenario_.has_grains()) {
+    std::swap(state_.grains, next_.grains);
+    std::swap(state_.contacts, next_.contacts);
+  }
+}
+
+}  // namespace varve::core

@@ -1,0 +1,50 @@
+#include "core/fluid_lists.h"
+
+#include <atomic>
+
+namespace varve::core {
+
+template <int D, class Position>
+bool FluidLists<D, Position>::stale(std::span<const Vec<Position, D>> fluid, double skin,
+                                    Workers& workers) const {
+  if (listed_at_.size() != fluid.size()) return true;
+  const double reach = 0.5 * skin;
+  std::atomic<bool> moved_far = false;  // whether anyone did, which has no order
+  workers.run(fluid.size(), 256, [&](std::size_t begin, std::size_t end, unsigned) {
+    bool far = false;
+    for (std::size_t i = begin; i < end; ++i) {
+      double r2 = 0;
+      for (int k = 0; k < D; ++k) {
+        const double d =
+            static_cast<double>(fluid[i][k]) - static_cast<double>(listed_at_[i][k]);
+        r2 += d * d;
+      }
+      // A point that crossed a periodic seam counts as moved: rare, and a rebuild is always right.
+      far = far || !(r2 < reach * reach);
+    }
+    if (far) moved_far = true;
+  });
+  return moved_far;
+}
+
+template <int D, class Position>
+void FluidLists<D, Position>::rebuild(std::span<const Vec<Position, D>> fluid,
+                                      std::span<const Vec<Position, D>> walls, double support,
+                                      double skin, const Periodicity<D>& period,
+                                      Workers& workers) {
+  const double radius = support + skin;
+  CellGrid<D, Position> fluid_cells, wall_cells;
+  fluid_cells.build(fluid, radius, period);
+  fluid_.assign(candidates<D, Position>(fluid, fluid, fluid_cells, radius, period, true, workers),
+                fluid.size(), Filler::own_index, 0);
+  wall_cells.build(walls, radius, period);
+  walls_.assign(candidates<D, Position>(fluid, walls, wall_cells, radius, period, false, workers),
+                fluid.size(), Filler::one_past, static_cast<std::int32_t>(walls.size()));
+  wall_rows_ = candidates<D, Position>(walls, fluid, fluid_cells, radius, period, false, workers);
+  of_walls_.assign(wall_rows_, walls.size(), Filler::minus_one, 0);
+  listed_at_.assign(fluid.begin(), fluid.end());
+}
+
+template class FluidLists<2, double>;
+
+}  // namespace varve::core

@@ -1,0 +1,114 @@
+// Neighbour candidates as a pure function of positions: everything within a radius, in ascending id.
+// The radius is larger than the kernel's support by a skin, so that lists live for several steps; the
+// pair loops filter by the current distance, hence a list is only an accelerator.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/pair_sweeps.h"
+#include "core/workers.h"
+
+namespace varve::core {
+
+/// Periods of a domain [m], 0 along axes that are not periodic, and its lower corner.
+template <int D>
+struct Periodicity {
+  double origin[D] = {};
+  double length[D] = {};
+  bool any() const {
+    for (double each : length)
+      if (each > 0) return true;
+    return false;
+  }
+};
+
+/// Uniform cells over a set of points; ids ascend within a cell.
+template <int D, class Position>
+class CellGrid {
+ public:
+  /// Cells no smaller than `cell` [m]. Along a periodic axis the cells divide the period. Points with
+  /// a coordinate that is not finite are put in the first cell.
+  void build(std::span<const Vec<Position, D>> points, double cell, const Periodicity<D>& period);
+
+  /// Calls visit(id) for all points in the cells within one cell of `point`, not in order of id.
+  template <class Visit>
+  void around(const Vec<Position, D>& point, Visit&& visit) const;
+
+ private:
+  std::int64_t coordinate(double x, int axis) const;
+
+  double origin_[D] = {}, inverse_cell_[D] = {};
+  std::int64_t size_[D] = {};
+  bool periodic_[D] = {};
+  std::vector<std::uint32_t> start_;
+  std::vector<std::uint32_t> points_;
+};
+
+/// Candidates per point, compressed rows: of point i they are index[start[i] .. start[i+1]).
+struct Rows {
+  std::vector<std::uint32_t> start;
+  std::vector<std::int32_t> index;
+  std::span<const std::int32_t> of(std::size_t i) const {
+    return {index.data() + start[i], index.data() + start[i + 1]};
+  }
+};
+
+/// For every point of `from`, the points of `to` (whose grid is given) nearer than `radius`,
+/// ascending; a point's own index is left out where `same` says that both sets are one.
+template <int D, class Position>
+Rows candidates(std::span<const Vec<Position, D>> from, std::span<const Vec<Position, D>> to,
+                const CellGrid<D, Position>& grid, double radius, const Periodicity<D>& period,
+                bool same, Workers& workers);
+
+/// What short lanes are filled with.
+enum class Filler { own_index, minus_one, one_past };
+
+/// The same rows, eight at a time and interleaved, as the pair sweeps read them.
+class GroupedStorage {
+ public:
+  /// `one_past` is the index used by Filler::one_past.
+  void assign(const Rows& rows, std::size_t points, Filler filler, std::int32_t one_past);
+  GroupedLists view() const { return {start_.data(), index_.data()}; }
+
+ private:
+  std::vector<std::uint32_t> start_;
+  std::vector<std::int32_t> index_;
+};
+
+// ---- template bodies ----
+
+template <int D, class Position>
+template <class Visit>
+void CellGrid<D, Position>::around(const Vec<Position, D>& point, Visit&& visit) const {
+  // Along a periodic axis of one or two cells the neighbours repeat; each is visited once.
+  std::int64_t cells[D][3];
+  int counts[D];
+  for (int a = 0; a < D; ++a) {
+    const std::int64_t middle = coordinate(static_cast<double>(point[a]), a);
+    counts[a] = 0;
+    for (std::int64_t step = -1; step <= 1; ++step) {
+      std::int64_t c = middle + step;
+      if (periodic_[a])
+        c = (c + size_[a]) % size_[a];
+      else if (c < 0 || c >= size_[a])
+        continue;
+      bool repeated = false;
+      for (int k = 0; k < counts[a]; ++k) repeated = repeated || cells[a][k] == c;
+      if (!repeated) cells[a][counts[a]++] = c;
+    }
+  }
+  const int planes = D == 3 ? counts[D - 1] : 1;
+  for (int z = 0; z < planes; ++z)
+    for (int y = 0; y < counts[1]; ++y)
+      for (int x = 0; x < counts[0]; ++x) {
+        std::int64_t cell = cells[1][y] * size_[0] + cells[0][x];
+        if constexpr (D == 3) cell += cells[2][z] * size_[0] * size_[1];
+        const auto c = static_cast<std::size_t>(cell);
+        for (std::uint32_t k = start_[c]; k < start_[c + 1]; ++k) visit(points_[k]);
+      }
+}
+
+}  // namespace varve::core

@@ -1,0 +1,85 @@
+// The two pair sweeps and the wall extrapolation: the hot loops of the fluid. They exist once, as
+// templates over dimension, precision, kernel and periodicity (core/pair_sweeps_impl.h), and are
+// compiled once per instruction set; the widest one that the processor has is chosen at run time.
+//
+// Eight particles are worked on side by side, each lane summing its own neighbours one after the
+// other in ascending id. A lane therefore does exactly what a plain scalar loop does, at every vector
+// width; a candidate beyond the kernel's support adds an exact zero, so that the skin of the lists
+// reaches no bit.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+
+#include "core/scenario.h"
+#include "core/state.h"
+
+namespace varve::core {
+
+inline constexpr std::size_t lanes = 8;
+
+/// Neighbour candidates of groups of `lanes` consecutive particles, interleaved: entry k of lane l in
+/// group g is index[(start[g] + k) * lanes + l]; short lanes are filled with `filler` entries that
+/// contribute nothing (the particle itself, or a padding point far away).
+struct GroupedLists {
+  const std::uint32_t* start = nullptr;   // groups + 1
+  const std::int32_t* index = nullptr;
+};
+
+/// Arrays and numbers of a sweep. Pointers to vectors are particle-major with D components.
+template <int D, class P>
+struct SweepData {
+  using Real = typename P::Real;
+  using Position = typename P::Position;
+
+  std::size_t count = 0;                  // fluid particles
+  const Position* position = nullptr;     // [m]
+  const Real* velocity = nullptr;         // [m/s]
+  const Real* mass = nullptr;             // [kg]
+  const Real* superficial_density = nullptr;  // rhob(n)
+  const Real* porosity = nullptr;         // floored; nullptr: 1 everywhere
+  const Real* volume_before = nullptr;    // m / rhob(n)
+  const Real* density_before = nullptr;   // rho(n) = rhob / eps
+  GroupedLists fluid, walls;              // of fluid particles: fluid and dummy candidates
+  GroupedLists of_walls;                  // of dummies: fluid candidates
+
+  std::size_t wall_count = 0;
+  const Position* wall_position = nullptr;
+  const Real* wall_own_velocity = nullptr;  // motion of the wall itself
+  const Real* wall_volume = nullptr;        // [m3] dx^D; the padding point has 0
+  const Real* wall_viscous_volume = nullptr;  // the same where no slip holds, else 0
+
+  Real* superficial_density_next = nullptr;  // rhob(n+1)
+  Real* volume = nullptr;                    // m / rhob(n+1)
+  Real* pressure = nullptr;                  // [Pa]
+  Real* wall_pressure = nullptr;             // extrapolated
+  Real* wall_velocity = nullptr;             // for viscosity: 2 v_wall - extrapolated
+  Real* stress_force = nullptr;              // [N] pressure and viscous force on a particle
+
+  Real smoothing_length = 0, dt = 0, reference_density = 0, sound_speed = 0, viscosity = 0;
+  Real diffusion = 0;               // delta of delta-SPH
+  Real gravity[D] = {};             // felt by the fluid (0 in the excess-pressure form)
+  Real hydrostatic_gradient[D] = {};  // d rho / dx of the fluid at rest (full pressure), else 0
+  Position period[D] = {};          // [m] 0 where not periodic
+};
+
+/// One implementation of the loops; each works on a range of groups.
+template <int D, class P>
+struct PairSweeps {
+  using Loop = void (*)(const SweepData<D, P>&, std::size_t group_begin, std::size_t group_end);
+  Loop density = nullptr;        // fluid groups: rhob(n+1), volume, pressure
+  Loop extrapolate = nullptr;    // wall groups: wall_pressure, wall_velocity
+  Loop stress = nullptr;         // fluid groups: stress_force
+};
+
+/// Instruction sets in ascending order of width.
+enum class InstructionSet { baseline, v3, v4 };
+std::string_view name_of(InstructionSet set);
+/// The widest set that this build holds and this processor has.
+InstructionSet best_instruction_set();
+
+template <int D, class P>
+PairSweeps<D, P> pair_sweeps(Kernel kernel, bool periodic, InstructionSet set);
+
+}  // namespace varve::core

@@ -1,0 +1,330 @@
+// The hot loops, included once per instruction set with VARVE_ISA naming the inner namespace. No
+// inline function of the standard library is called here: the linker might otherwise keep the copy
+// made for a wider instruction set and run it on a processor that lacks it.
+// (No include guard beyond the pragma is needed: each source file includes it once.)
+#pragma once
+
+#include "core/pair_sweeps.h"
+
+namespace varve::core::VARVE_ISA {
+namespace {
+
+template <class T>
+struct LaneVector {
+  typedef T type __attribute__((vector_size(lanes * sizeof(T))));
+};
+template <class T>
+using Lane = typename LaneVector<T>::type;
+
+template <class T>
+inline __attribute__((always_inline)) void square_root(Lane<T>& value) {
+  for (std::size_t l = 0; l < lanes; ++l) {
+    if constexpr (sizeof(T) == 8)
+      value[l] = __builtin_sqrt(value[l]);
+    else
+      value[l] = __builtin_sqrtf(value[l]);
+  }
+}
+
+template <class T>
+inline __attribute__((always_inline)) Lane<T> positive(Lane<T> value) {
+  return value > T(0) ? value : Lane<T>{};
+}
+
+/// Entry `component` of `stride`-component vectors at the lanes' indices.
+template <class T>
+inline __attribute__((always_inline)) Lane<T> gather(const T* data, const std::int32_t* index,
+                                                     int stride, int component) {
+  Lane<T> value;
+  for (std::size_t l = 0; l < lanes; ++l)
+    value[l] = data[static_cast<std::ptrdiff_t>(index[l]) * stride + component];
+  return value;
+}
+
+template <class To, class From>
+inline __attribute__((always_inline)) Lane<To> narrow(Lane<From> value) {
+  if constexpr (sizeof(To) == sizeof(From))
+    return value;
+  else
+    return __builtin_convertvector(value, Lane<To>);
+}
+
+// Kernels without their normalisation: value f(q) and slope f'(q)/q, q = r/h, both zero beyond the
+// support (physics: W = sigma/h^D f, grad W = sigma/h^(D+2) (f'/q) r_ab). Wendland 1995 C2: f = (1-q/2)^4
+// (2q+1), f'/q = -5 (1-q/2)^3. B-splines (Schoenberg): truncated powers, slope guarded at q = 0,
+// where the true slope times r_ab is 0.
+template <Kernel K, class T>
+inline __attribute__((always_inline)) Lane<T> kernel_value(Lane<T> q) {
+  if constexpr (K == Kernel::wendland_c2) {
+    const Lane<T> u = positive<T>(T(1) - T(0.5) * q);
+    const Lane<T> u2 = u * u;
+    return u2 * u2 * (T(2) * q + T(1));
+  } else if constexpr (K == Kernel::cubic) {
+    const Lane<T> a = positive<T>(T(2) - q), b = positive<T>(T(1) - q);
+    return T(0.25) * (a * a * a) - b * b * b;
+  } else {
+    const Lane<T> a = positive<T>(T(3) - q), b = positive<T>(T(2) - q), c = positive<T>(T(1) - q);
+    return (a * a) * (a * a) * a - T(6) * ((b * b) * (b * b) * b) + T(15) * ((c * c) * (c * c) * c);
+  }
+}
+template <Kernel K, class T>
+inline __attribute__((always_inline)) Lane<T> kernel_slope(Lane<T> q) {
+  if constexpr (K == Kernel::wendland_c2) {
+    const Lane<T> u = positive<T>(T(1) - T(0.5) * q);
+    return T(-5) * (u * u * u);
+  } else {
+    Lane<T> numerator;
+    if constexpr (K == Kernel::cubic) {
+      const Lane<T> a = positive<T>(T(2) - q), b = positive<T>(T(1) - q);
+      numerator = T(3) * (b * b) - T(0.75) * (a * a);
+    } else {
+      const Lane<T> a = positive<T>(T(3) - q), b = positive<T>(T(2) - q),
+                    c = positive<T>(T(1) - q);
+      numerator = T(30) * ((b * b) * (b * b)) - T(5) * ((a * a) * (a * a)) -
+                  T(75) * ((c * c) * (c * c));
+    }
+    const Lane<T> divisor = q > T(1e-12) ? q : T(1e-12) - Lane<T>{};
+    const Lane<T> slope = numerator / divisor;
+    return q > T(1e-12) ? slope : Lane<T>{};
+  }
+}
+
+/// sigma in W = sigma/h^D f(q).
+template <Kernel K, int D, class T>
+inline T normalisation() {
+  constexpr double pi = 3.14159265358979323846;
+  if constexpr (K == Kernel::wendland_c2) return T(D == 2 ? 7 / (4 * pi) : 21 / (16 * pi));
+  if constexpr (K == Kernel::cubic) return T(D == 2 ? 10 / (7 * pi) : 1 / pi);
+  return T(D == 2 ? 7 / (478 * pi) : 1 / (120 * pi));
+}
+template <int D, class T>
+inline T power_of_length(T h) {
+  return D == 2 ? h * h : h * h * h;
+}
+
+/// What one slot of a list holds for eight lanes: separation, its square, kernel argument.
+template <int D, class P>
+struct Separation {
+  using Real = typename P::Real;
+  Lane<Real> d[D], r2, q;
+
+  template <bool periodic>
+  inline __attribute__((always_inline)) void set(const Lane<typename P::Position>* own,
+                                                 const typename P::Position* other,
+                                                 const std::int32_t* index,
+                                                 const typename P::Position* period, Real inverse_h) {
+    using Position = typename P::Position;
+    r2 = Lane<Real>{};
+    for (int c = 0; c < D; ++c) {
+      Lane<Position> wide = own[c] - gather(other, index, D, c);
+      if constexpr (periodic) {
+        const Position length = period[c], half = length * Position(0.5);
+        const Lane<Position> lengths = length - Lane<Position>{};
+        wide = wide > half ? wide - lengths : wide;
+        wide = wide < -half ? wide + lengths : wide;
+        // A side that is not periodic has period 0: both lines then add or take away 0.
+      }
+      d[c] = narrow<Real, Position>(wide);
+      r2 += d[c] * d[c];
+    }
+    q = r2;
+    square_root<Real>(q);
+    q *= inverse_h;
+  }
+};
+
+/// Loads eight consecutive particles; lanes past the end repeat the last one and are not stored.
+struct OwnIndex {
+  std::int32_t index[lanes];
+  std::size_t used;
+  OwnIndex(std::size_t group, std::size_t count) {
+    const std::size_t first = group * lanes;
+    used = count - first < lanes ? count - first : lanes;
+    for (std::size_t l = 0; l < lanes; ++l)
+      index[l] = static_cast<std::int32_t>(first + (l < used ? l : used - 1));
+  }
+};
+
+/// Continuity for the superficial density (Robinson, Ramaioli and Luding 2014, in the volume form
+/// that is energy-consistent with the pressure force below) with density diffusion on the intrinsic
+/// density (Molteni and Colagrossi 2009):
+///   d rhob_a/dt = rhob_a sum_b V_b v_ab . grad W_ab
+///               + eps_a delta h c0 sum_fluid 2 (rho_a - rho_b) (W'/r) V_b
+/// then P = c0^2 (rhob/eps - rho0).
+template <int D, class P, Kernel K, bool periodic>
+void density_loop(const SweepData<D, P>& s, std::size_t group_begin, std::size_t group_end) {
+  using Real = typename P::Real;
+  using Position = typename P::Position;
+  const Real inverse_h = Real(1) / s.smoothing_length;
+  const Real slope_scale =
+      normalisation<K, D, Real>() / power_of_length<D>(s.smoothing_length) * inverse_h * inverse_h;
+  const Real diffusion = Real(2) * s.diffusion * s.smoothing_length * s.sound_speed;
+  const Real stiffness = s.sound_speed * s.sound_speed;
+  for (std::size_t g = group_begin; g < group_end; ++g) {
+    const OwnIndex own(g, s.count);
+    Lane<Position> x[D];
+    Lane<Real> v[D];
+    for (int c = 0; c < D; ++c) {
+      x[c] = gather(s.position, own.index, D, c);
+      v[c] = gather(s.velocity, own.index, D, c);
+    }
+    const Lane<Real> rho = gather(s.density_before, own.index, 1, 0);
+    Lane<Real> divergence{}, spread{};
+    Separation<D, P> pair;
+    for (std::uint32_t k = s.fluid.start[g]; k < s.fluid.start[g + 1]; ++k) {
+      const std::int32_t* j = s.fluid.index + std::size_t(k) * lanes;
+      pair.template set<periodic>(x, s.position, j, s.period, inverse_h);
+      Lane<Real> approach{}, drop = rho - gather(s.density_before, j, 1, 0);
+      for (int c = 0; c < D; ++c) {
+        approach += (v[c] - gather(s.velocity, j, D, c)) * pair.d[c];
+        drop += s.hydrostatic_gradient[c] * -pair.d[c];
+      }
+      const Lane<Real> weight =
+          gather(s.volume_before, j, 1, 0) * kernel_slope<K, Real>(pair.q);
+      divergence += weight * approach;
+      spread += weight * drop;
+    }
+    for (std::uint32_t k = s.walls.start[g]; k < s.walls.start[g + 1]; ++k) {
+      const std::int32_t* j = s.walls.index + std::size_t(k) * lanes;
+      pair.template set<periodic>(x, s.wall_position, j, s.period, inverse_h);
+      Lane<Real> approach{};
+      for (int c = 0; c < D; ++c)
+        approach += (v[c] - gather(s.wall_own_velocity, j, D, c)) * pair.d[c];
+      divergence += gather(s.wall_volume, j, 1, 0) * kernel_slope<K, Real>(pair.q) * approach;
+    }
+    for (std::size_t l = 0; l < own.used; ++l) {
+      const std::size_t i = g * lanes + l;
+      const Real eps = s.porosity ? s.porosity[i] : Real(1);
+      const Real rhob = s.superficial_density[i];
+      const Real rate =
+          slope_scale * (rhob * divergence[l] + eps * diffusion * spread[l]);
+      const Real next = rhob + s.dt * rate;
+      s.superficial_density_next[i] = next;
+      s.volume[i] = s.mass[i] / next;
+      s.pressure[i] = stiffness * (next / eps - s.reference_density);
+    }
+  }
+}
+
+/// Adami, Hu and Adams 2012: pressure and velocity of dummy particles from the fluid around them,
+///   P_w = (sum_f P_f W + g . sum_f rho_f (r_w - r_f) W) / sum_f W,  v_w = 2 v_wall - sum_f v_f W / sum_f W
+template <int D, class P, Kernel K, bool periodic>
+void extrapolate_loop(const SweepData<D, P>& s, std::size_t group_begin, std::size_t group_end) {
+  using Real = typename P::Real;
+  using Position = typename P::Position;
+  const Real inverse_h = Real(1) / s.smoothing_length;
+  const Real stiffness = s.sound_speed * s.sound_speed;
+  for (std::size_t g = group_begin; g < group_end; ++g) {
+    const OwnIndex own(g, s.wall_count);
+    Lane<Position> x[D];
+    for (int c = 0; c < D; ++c) x[c] = gather(s.wall_position, own.index, D, c);
+    Lane<Real> weights{}, pressures{}, velocities[D] = {};
+    Separation<D, P> pair;
+    for (std::uint32_t k = s.of_walls.start[g]; k < s.of_walls.start[g + 1]; ++k) {
+      const std::int32_t* j = s.of_walls.index + std::size_t(k) * lanes;
+      // Index -1 fills short lanes: its weight is taken to be 0.
+      std::int32_t safe[lanes];
+      Lane<Real> real{};
+      for (std::size_t l = 0; l < lanes; ++l) {
+        safe[l] = j[l] < 0 ? 0 : j[l];
+        real[l] = j[l] < 0 ? Real(0) : Real(1);
+      }
+      pair.template set<periodic>(x, s.position, safe, s.period, inverse_h);
+      const Lane<Real> w = real * kernel_value<K, Real>(pair.q);
+      const Lane<Real> p = gather(s.pressure, safe, 1, 0);
+      const Lane<Real> rho = p / stiffness + s.reference_density;
+      Lane<Real> head{};
+      for (int c = 0; c < D; ++c) {
+        head += s.gravity[c] * pair.d[c];
+        velocities[c] += w * gather(s.velocity, safe, D, c);
+      }
+      weights += w;
+      pressures += w * (p + rho * head);
+    }
+    for (std::size_t l = 0; l < own.used; ++l) {
+      const std::size_t i = g * lanes + l;
+      const bool near = weights[l] > Real(0);
+      s.wall_pressure[i] = near ? pressures[l] / weights[l] : Real(0);
+      for (int c = 0; c < D; ++c) {
+        const Real wall = s.wall_own_velocity[i * D + std::size_t(c)];
+        s.wall_velocity[i * D + std::size_t(c)] =
+            near ? Real(2) * wall - velocities[c][l] / weights[l] : wall;
+      }
+    }
+  }
+}
+
+/// Pressure and viscous force (Morris, Fox and Zhu 1997), antisymmetric pair by pair:
+///   F_a = V_a sum_b V_b [ -(P_a + P_b) (W'/r) r_ab + 2 mu (W'/r) r^2/(r^2 + 0.01 h^2) v_ab ]
+template <int D, class P, Kernel K, bool periodic>
+void stress_loop(const SweepData<D, P>& s, std::size_t group_begin, std::size_t group_end) {
+  using Real = typename P::Real;
+  using Position = typename P::Position;
+  const Real inverse_h = Real(1) / s.smoothing_length;
+  const Real slope_scale =
+      normalisation<K, D, Real>() / power_of_length<D>(s.smoothing_length) * inverse_h * inverse_h;
+  const Real soft = Real(0.01) * s.smoothing_length * s.smoothing_length;
+  const Real viscous = Real(2) * s.viscosity;
+  for (std::size_t g = group_begin; g < group_end; ++g) {
+    const OwnIndex own(g, s.count);
+    Lane<Position> x[D];
+    Lane<Real> v[D], force[D];
+    for (int c = 0; c < D; ++c) {
+      x[c] = gather(s.position, own.index, D, c);
+      v[c] = gather(s.velocity, own.index, D, c);
+      force[c] = Lane<Real>{};
+    }
+    const Lane<Real> p = gather(s.pressure, own.index, 1, 0);
+    Separation<D, P> pair;
+    for (std::uint32_t k = s.fluid.start[g]; k < s.fluid.start[g + 1]; ++k) {
+      const std::int32_t* j = s.fluid.index + std::size_t(k) * lanes;
+      pair.template set<periodic>(x, s.position, j, s.period, inverse_h);
+      const Lane<Real> weight = gather(s.volume, j, 1, 0) * kernel_slope<K, Real>(pair.q);
+      const Lane<Real> push = -(p + gather(s.pressure, j, 1, 0)) * weight;
+      const Lane<Real> drag = viscous * weight * (pair.r2 / (pair.r2 + soft));
+      for (int c = 0; c < D; ++c)
+        force[c] += push * pair.d[c] + drag * (v[c] - gather(s.velocity, j, D, c));
+    }
+    for (std::uint32_t k = s.walls.start[g]; k < s.walls.start[g + 1]; ++k) {
+      const std::int32_t* j = s.walls.index + std::size_t(k) * lanes;
+      pair.template set<periodic>(x, s.wall_position, j, s.period, inverse_h);
+      const Lane<Real> slope = kernel_slope<K, Real>(pair.q);
+      const Lane<Real> push =
+          -(p + gather(s.wall_pressure, j, 1, 0)) * (gather(s.wall_volume, j, 1, 0) * slope);
+      const Lane<Real> drag = viscous * (gather(s.wall_viscous_volume, j, 1, 0) * slope) *
+                              (pair.r2 / (pair.r2 + soft));
+      for (int c = 0; c < D; ++c)
+        force[c] += push * pair.d[c] + drag * (v[c] - gather(s.wall_velocity, j, D, c));
+    }
+    for (std::size_t l = 0; l < own.used; ++l) {
+      const std::size_t i = g * lanes + l;
+      for (int c = 0; c < D; ++c)
+        s.stress_force[i * D + std::size_t(c)] = slope_scale * s.volume[i] * force[c][l];
+    }
+  }
+}
+
+template <int D, class P, Kernel K>
+PairSweeps<D, P> sweeps_for(bool periodic) {
+  if (periodic)
+    return {density_loop<D, P, K, true>, extrapolate_loop<D, P, K, true>,
+            stress_loop<D, P, K, true>};
+  return {density_loop<D, P, K, false>, extrapolate_loop<D, P, K, false>,
+          stress_loop<D, P, K, false>};
+}
+
+}  // namespace
+
+template <int D, class P>
+PairSweeps<D, P> sweeps(Kernel kernel, bool periodic) {
+  switch (kernel) {
+    case Kernel::cubic: return sweeps_for<D, P, Kernel::cubic>(periodic);
+    case Kernel::quintic: return sweeps_for<D, P, Kernel::quintic>(periodic);
+    case Kernel::wendland_c2: break;
+  }
+  return sweeps_for<D, P, Kernel::wendland_c2>(periodic);
+}
+
+template PairSweeps<2, DoublePrecision> sweeps<2, DoublePrecision>(Kernel, bool);
+
+}  // namespace varve::core::VARVE_ISA
