@@ -52,8 +52,8 @@ class Resolver {
       } else {
         continue;
       }
-      problem(std::string(parameter.key), "'" + get_parameter(s_, parameter) +
-                                              "' is out of range; expected " +
+      problem(std::string(parameter.key), get_parameter(s_, parameter) +
+                                              " is out of range; expected " +
                                               expected_text(parameter));
     }
     return problems_.empty();
