@@ -255,8 +255,39 @@ void Contacts<D, P>::collect() {
             [](const auto& a, const auto& b) { return a.key < b.key; });
 }
 
+/// One sub-step of the motion under the contact forces in the slots.
 template <int D, class P>
-void Contacts<D, P>::advance(const Constants<D>& c, std::span<const Vec<double, D>> force,
+void Contacts<D, P>::move(const Constants<D>& c, std::span<const OuterForce<D>> outer, double dt,
+                          GrainState<D, P>& grains) {
+  const double per_mass = dt / c.grain_mass, per_inertia = dt / c.grain_inertia;
+  for (std::size_t i = 0; i < grains.size(); ++i) {
+    Vec<double, D> total = outer[i].force;
+    Vec<double, spin_components<D>> turning = Vec<double, spin_components<D>>::Zero();
+    for (std::uint32_t k = start_[i]; k < start_[i + 1]; ++k) {
+      const Slot& slot = slots_[of_grain_[k]];
+      if (!slot.touching) continue;
+      if (slot.i == i) {
+        total += slot.force;
+        turning += slot.torque_i;
+      } else {
+        total -= slot.force;
+        turning += slot.torque_j;
+      }
+    }
+    const double coefficient = outer[i].coefficient;
+    const Vec<double, D> v = grains.velocity[i].template cast<double>();
+    const Vec<double, D> moved = (v + per_mass * (total + coefficient * outer[i].fluid_velocity)) /
+                                 (1 + per_mass * coefficient);
+    mean_drag_[i] += dt / c.dt * (coefficient * (outer[i].fluid_velocity - moved));
+    grains.velocity[i] = moved.template cast<Real>();
+    grains.position[i] +=
+        (dt * grains.velocity[i].template cast<double>()).template cast<Position>();
+    if (c.rotation) grains.spin[i] += (per_inertia * turning).template cast<Real>();
+  }
+}
+
+template <int D, class P>
+void Contacts<D, P>::advance(const Constants<D>& c, std::span<const OuterForce<D>> outer,
                              const std::vector<WallPlane>& walls, double overlap_limit,
                              std::uint64_t step, GrainState<D, P>& grains,
                              ContactState<D, P>& contacts) {
@@ -266,6 +297,7 @@ void Contacts<D, P>::advance(const Constants<D>& c, std::span<const Vec<double, 
   }
   retired_.clear();
   load(contacts);
+  mean_drag_.assign(grains.size(), Vec<double, D>::Zero());
   const double dt = c.dt / static_cast<double>(c.substeps);
   for (std::int64_t substep = 0; substep < c.substeps; ++substep) {
     if (substep > 0 && list_is_stale(c, grains)) build_list(c, walls, grains);
@@ -273,24 +305,7 @@ void Contacts<D, P>::advance(const Constants<D>& c, std::span<const Vec<double, 
       evaluate(c, walls, grains, dt, slot);
       check_overlap(slot, slot.touching ? slot.record.peak_overlap : 0, overlap_limit, step);
     }
-    for (std::size_t i = 0; i < grains.size(); ++i) {
-      Vec<double, D> total = force[i];
-      Vec<double, spin_components<D>> turning = Vec<double, spin_components<D>>::Zero();
-      for (std::uint32_t k = start_[i]; k < start_[i + 1]; ++k) {
-        const Slot& slot = slots_[of_grain_[k]];
-        if (!slot.touching) continue;
-        if (slot.i == i) {
-          total += slot.force;
-          turning += slot.torque_i;
-        } else {
-          total -= slot.force;
-          turning += slot.torque_j;
-        }
-      }
-      grains.velocity[i] += (dt * (total / c.grain_mass)).template cast<Real>();
-      grains.position[i] += (dt * grains.velocity[i].template cast<double>()).template cast<Position>();
-      if (c.rotation) grains.spin[i] += (dt * (turning / c.grain_inertia)).template cast<Real>();
-    }
+    move(c, outer, dt, grains);
   }
   store(c, contacts);
   collect();

@@ -14,6 +14,15 @@
 
 namespace varve::core {
 
+/// What acts on a grain besides contacts, held through the sub-steps of a step: a constant force and a
+/// drag K (u - v) towards the fluid's velocity u.
+template <int D>
+struct OuterForce {
+  Vec<double, D> force = Vec<double, D>::Zero();           // [N] weight and hydrodynamic force
+  Vec<double, D> fluid_velocity = Vec<double, D>::Zero();  // [m/s] u
+  double coefficient = 0;                                  // [N s/m] K
+};
+
 /// What happened at one contact during one step: partial sums, a function of the state at its start.
 template <int D>
 struct ContactRecord {
@@ -38,13 +47,16 @@ class Contacts {
   /// Forgets the candidate list, as after a change of the state from outside.
   void reset() { listed_at_.clear(); }
 
-  /// Moves all grains through one step of constants.dt under `force` (all but contact forces; [N] per
-  /// grain) and contacts. `next` must be a copy of `state`'s grains and contacts; it is advanced.
-  /// Throws NumericalFailure where an overlap exceeds `overlap_limit` [m].
-  void advance(const Constants<D>& c, std::span<const Vec<double, D>> force,
+  /// Moves all grains through one step of constants.dt. Drag is implicit in every sub-step,
+  ///   v' = (v + dt_s/m (F + F_contact + K u)) / (1 + dt_s K/m),
+  /// so that it is stable for any K, exact at terminal speed and zero on a grain that rests on a
+  /// contact. Throws NumericalFailure where an overlap exceeds `overlap_limit` [m].
+  void advance(const Constants<D>& c, std::span<const OuterForce<D>> outer,
                const std::vector<WallPlane>& walls, double overlap_limit, std::uint64_t step,
                GrainState<D, P>& grains, ContactState<D, P>& contacts);
 
+  /// Mean drag on each grain over the last step [N]: what the fluid must lose.
+  const std::vector<Vec<double, D>>& mean_drag() const { return mean_drag_; }
   /// Records of the last step, ascending key.
   const std::vector<ContactRecord<D>>& records() const { return records_; }
   /// Sum of contact impulses on the grains, wall contacts only [N s].
@@ -77,6 +89,8 @@ class Contacts {
   void evaluate(const Constants<D>& c, const std::vector<WallPlane>& walls,
                 const GrainState<D, P>& grains, double dt, Slot& slot) const;
   void check_overlap(const Slot& slot, double overlap, double limit, std::uint64_t step) const;
+  void move(const Constants<D>& c, std::span<const OuterForce<D>> outer, double dt,
+            GrainState<D, P>& grains);
   void collect();
 
   std::vector<Slot> slots_;               // ascending key
@@ -85,6 +99,7 @@ class Contacts {
   std::vector<Vec<Position, D>> listed_at_;
   std::vector<ContactRecord<D>> retired_;  // ended within the step and gone from the list
   std::vector<ContactRecord<D>> records_;
+  std::vector<Vec<double, D>> mean_drag_;
   std::uint64_t list_builds_ = 0;
 };
 

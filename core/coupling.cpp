@@ -164,13 +164,6 @@ GrainForce<D> CouplingStage<D, P>::force_on(const Constants<D>& c, const State<D
   for (int k = 0; k < D; ++k) speed2 += slip[k] * slip[k];
   const Slip argument{std::sqrt(speed2), f.porosity, c.diameter, c.reference_density, c.viscosity};
   f.coefficient = drag_coefficient<D>(law, argument);
-  // v* = (v + dt/m (F_hyd + W + K u)) / (1 + dt K / m): unconditionally stable, and the force that
-  // belongs to it is the one that the fluid loses.
-  const double per_mass = c.dt / c.grain_mass;
-  const Vec<double, D> moved =
-      (v + per_mass * (f.hydrodynamic + c.grain_weight + f.coefficient * f.fluid_velocity)) /
-      (1 + per_mass * f.coefficient);
-  f.drag = f.coefficient * (f.fluid_velocity - (c.frozen ? v : moved));
   return f;
 }
 
@@ -180,18 +173,23 @@ void CouplingStage<D, P>::forces(const Constants<D>& c, const State<D, P>& state
                             Workers& workers) {
   if (!c.two_way) compute_weights(c, state, fluid.position, workers);
   workers.run(state.grains.size(), 1, [&](std::size_t begin, std::size_t end, unsigned) {
-    for (std::size_t i = begin; i < end; ++i) {
-      forces_[i] = force_on(c, state, fluid, law, i);
-      const GrainForce<D>& f = forces_[i];
-      reaction_per_weight_[i] = f.weight > 0
-                                    ? Vec<double, D>(-(f.hydrodynamic + f.drag) / f.weight)
-                                    : Vec<double, D>(Vec<double, D>::Zero());
-    }
+    for (std::size_t i = begin; i < end; ++i) forces_[i] = force_on(c, state, fluid, law, i);
   });
   grain_clamps_ = weak_ = 0;
   for (const GrainForce<D>& f : forces_) {
     if (f.porosity <= c.porosity_floor) ++grain_clamps_;
     if (f.weight < 0.5) ++weak_;
+  }
+}
+
+template <int D, class P>
+void CouplingStage<D, P>::set_drag(std::span<const Vec<double, D>> mean_drag) {
+  for (std::size_t i = 0; i < forces_.size(); ++i) {
+    GrainForce<D>& f = forces_[i];
+    f.drag = mean_drag[i];
+    reaction_per_weight_[i] = f.weight > 0
+                                  ? Vec<double, D>(-(f.hydrodynamic + f.drag) / f.weight)
+                                  : Vec<double, D>(Vec<double, D>::Zero());
   }
 }
 

@@ -24,11 +24,11 @@ struct FluidView {
   std::span<const Vec<typename P::Real, D>> stress_force;  // [N] on each fluid particle
 };
 
-/// Force on one grain, held constant over the sub-steps of a step.
+/// What the fluid does to one grain during a step.
 template <int D>
 struct GrainForce {
   Vec<double, D> hydrodynamic = Vec<double, D>::Zero();  // [N] V (-grad p + div tau)
-  Vec<double, D> drag = Vec<double, D>::Zero();          // [N] K (u - v*)
+  Vec<double, D> drag = Vec<double, D>::Zero();          // [N] mean of K (u - v) over the sub-steps
   Vec<double, D> fluid_velocity = Vec<double, D>::Zero();  // [m/s] u at the grain
   double porosity = 1;     // [-] felt by the grain, floored
   double coefficient = 0;  // [N s/m] K
@@ -56,10 +56,13 @@ class CouplingStage {
                 double wall_volume, std::span<Real> porosity, std::span<Real> floored,
                 Workers& workers);
 
-  /// E11, E12 and the semi-implicit drag: forces on all grains. With `coupled` one-way the weights are
-  /// computed here.
+  /// E11, E12: hydrodynamic forces on all grains and their drag coefficients, at the slip that the step
+  /// starts with. One-way coupling has its weights computed here.
   void forces(const Constants<D>& c, const State<D, P>& state, const FluidView<D, P>& fluid,
               const DragLaw<D>& law, Workers& workers);
+
+  /// Takes over the drag that the grains really felt, from their motion.
+  void set_drag(std::span<const Vec<double, D>> mean_drag);
 
   /// E13: reaction on fluid particle `a` [N]: -sum_i (F_hyd + F_drag)_i V_a W_ai / S_i.
   Vec<double, D> reaction(std::size_t a, double volume) const {

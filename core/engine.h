@@ -62,7 +62,7 @@ class Engine final : public Simulation {
     std::vector<Real> wall_volume, wall_viscous_volume, wall_pressure;
     std::size_t wall_count = 0;
     std::vector<Vec<Position, D>> coupling_wall_position;
-    std::vector<Vec<double, D>> grain_force;
+    std::vector<OuterForce<D>> outer;  // per grain
   };
 
   void build_fields();
@@ -82,6 +82,8 @@ class Engine final : public Simulation {
   void find_stresses();
   void find_grain_forces();
   void move_grains();
+  void hold_grains();
+  void sum_work();
   void move_fluid();
   void check_grains() const;
   void commit();

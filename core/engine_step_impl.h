@@ -180,32 +180,53 @@ template <int D, class P>
 void Engine<D, P>::move_grains() {
   next_.grains = state_.grains;
   next_.contacts = state_.contacts;
-  drag_work_ = hydrodynamic_work_ = 0;
-  if (c_.frozen) return;
-  work_.grain_force.resize(state_.grains.size());
-  for (std::size_t i = 0; i < state_.grains.size(); ++i) {
-    work_.grain_force[i] = c_.grain_weight;
-    if (c_.coupled) {
+  const std::size_t n = state_.grains.size();
+  work_.outer.assign(n, {c_.grain_weight, Vec<double, D>::Zero(), 0});
+  if (c_.coupled)
+    for (std::size_t i = 0; i < n; ++i) {
       const GrainForce<D>& f = coupling_.grain_forces()[i];
-      work_.grain_force[i] += f.hydrodynamic + f.drag;
+      work_.outer[i] = {c_.grain_weight + f.hydrodynamic, f.fluid_velocity, f.coefficient};
     }
+  if (c_.frozen) {
+    hold_grains();
+    return;
   }
-  contacts_.advance(c_, work_.grain_force, planes_, scenario_.guards.overlap * c_.diameter,
+  contacts_.advance(c_, work_.outer, planes_, scenario_.guards.overlap * c_.diameter,
                     state_.clock.step + 1, next_.grains, next_.contacts);
   counters_.grain_substeps += static_cast<std::uint64_t>(c_.substeps);
   count_pass(engine_detail::pass_contacts);
-  if (c_.coupled)
-    for (std::size_t i = 0; i < state_.grains.size(); ++i) {
-      const GrainForce<D>& f = coupling_.grain_forces()[i];
-      for (int k = 0; k < D; ++k) {
-        const double moved = static_cast<double>(next_.grains.position[i][k]) -
-                             static_cast<double>(state_.grains.position[i][k]);
-        drag_work_ += f.drag[k] * moved;
-        hydrodynamic_work_ += f.hydrodynamic[k] * moved;
-      }
-    }
+  if (c_.coupled) {
+    coupling_.set_drag(contacts_.mean_drag());
+    sum_work();
+  }
   for (auto& x : next_.grains.position) wrap(x);
   check_grains();
+}
+
+/// Frozen grains feel the fluid and give it back; nothing moves them.
+template <int D, class P>
+void Engine<D, P>::hold_grains() {
+  if (!c_.coupled) return;
+  std::vector<Vec<double, D>> drag(state_.grains.size());
+  for (std::size_t i = 0; i < drag.size(); ++i)
+    drag[i] = work_.outer[i].coefficient *
+              (work_.outer[i].fluid_velocity - state_.grains.velocity[i].template cast<double>());
+  coupling_.set_drag(drag);
+}
+
+/// Work done on the grains by drag and by the fluid's stresses during the step [J].
+template <int D, class P>
+void Engine<D, P>::sum_work() {
+  drag_work_ = hydrodynamic_work_ = 0;
+  for (std::size_t i = 0; i < state_.grains.size(); ++i) {
+    const GrainForce<D>& f = coupling_.grain_forces()[i];
+    for (int k = 0; k < D; ++k) {
+      const double moved = static_cast<double>(next_.grains.position[i][k]) -
+                           static_cast<double>(state_.grains.position[i][k]);
+      drag_work_ += f.drag[k] * moved;
+      hydrodynamic_work_ += f.hydrodynamic[k] * moved;
+    }
+  }
 }
 
 template <int D, class P>
