@@ -1,0 +1,66 @@
+#include "tools/diff_search.h"
+
+namespace varve::tools {
+namespace {
+
+struct Probe {
+  std::uint64_t step = 0;
+  bool equal = false;
+};
+
+// The held step nearest to `step` going up to `to`.
+std::optional<Probe> probe_up(std::uint64_t step, std::uint64_t to, const EqualAt& equal) {
+  for (;; ++step) {
+    if (const auto answer = equal(step)) return Probe{step, *answer};
+    if (step >= to) return {};
+  }
+}
+
+std::optional<Probe> probe_down(std::uint64_t step, std::uint64_t from, const EqualAt& equal) {
+  for (;; --step) {
+    if (const auto answer = equal(step)) return Probe{step, *answer};
+    if (step <= from) return {};
+  }
+}
+
+}  // namespace
+
+ChainSearch search_chains(std::uint64_t from, std::uint64_t to, const EqualAt& chains_equal) {
+  ChainSearch out;
+  if (from > to) return out;
+  const auto last = probe_down(to, from, chains_equal);
+  if (!last) return out;
+  out.any_step = true;
+  out.last_held = last->step;
+  const auto first = probe_up(from, last->step, chains_equal);
+  out.first_held = first->step;
+  if (last->equal) return out;
+  if (!first->equal) {
+    out.first_unequal = first->step;
+    return out;
+  }
+  std::uint64_t equal = first->step, unequal = last->step;
+  while (unequal - equal > 1) {
+    const std::uint64_t middle = equal + (unequal - equal) / 2;
+    // Lost steps around the middle: go on with the nearest ones that are there.
+    auto probe = probe_up(middle, unequal - 1, chains_equal);
+    if (!probe && middle > equal + 1) probe = probe_down(middle - 1, equal + 1, chains_equal);
+    if (!probe) break;
+    (probe->equal ? equal : unequal) = probe->step;
+  }
+  out.last_equal = equal;
+  out.first_unequal = unequal;
+  return out;
+}
+
+std::optional<std::uint64_t> scan_first_unequal(std::uint64_t from, std::uint64_t to,
+                                                const EqualAt& equal) {
+  for (std::uint64_t step = from; step <= to; ++step) {
+    const auto answer = equal(step);
+    if (answer && !*answer) return step;
+    if (step == to) break;
+  }
+  return {};
+}
+
+}  // namespace varve::tools
