@@ -16,24 +16,35 @@ namespace varve::io {
 
 /// One field of one record, as stored. `payload` is self-contained given the codec's history.
 struct EncodedField {
-  std::uint8_t method = 0;  ///< io/FORMAT.md, "Field methods"
+  std::uint8_t method = 0;  ///< io/CODEC.md, "Methods"
   std::uint8_t order = 0;   ///< of the extrapolation
   std::uint64_t count = 0;  ///< particles
   std::vector<std::byte> payload;
 };
 
 struct CodecLimits {
-  std::uint64_t field_bytes_max = std::uint64_t{1} << 30;  ///< uncompressed
-  std::uint64_t ratio_max = 10000;                         ///< unless below 1 MiB
+  std::uint64_t field_bytes_max = std::uint64_t{1} << 30;  ///< uncompressed, per field
+  /// Uncompressed / stored bytes, over all fields of a record that are stored whole; not applied
+  /// where they come to less than 1 MiB uncompressed.
+  std::uint64_t ratio_max = 10000;
 };
 
 /// Encodes consecutive frames. A keyframe starts a new history.
 class FrameEncoder {
  public:
+  /// Throws LogError (mismatch) for a field without components.
   static std::unique_ptr<FrameEncoder> create(const Schema& schema);
   virtual ~FrameEncoder() = default;
-  /// Encodes all fields; a change of any count forces a keyframe, which is then reported in
-  /// `keyframe`. The frame becomes history.
+  /// The next frame is a keyframe: stored whole, decodable without any frame before it. Deciding
+  /// when is the caller's part; the encoder itself makes only the first frame one.
+  virtual void restart() = 0;
+  /// Encodes all fields, in the schema's order; the frame becomes history. `keyframe` tells whether
+  /// the record is self-contained. A population whose particles came or went does not need a
+  /// keyframe: where it has ascending ids, those that stay keep their history; where it has none, its
+  /// fields alone are stored whole. Fields that are called constant and change all the same are
+  /// stored whole as well. `frame.time` must be the frame's time, `frame.dt` the step's length for
+  /// the `follows` rule; frames may lie several steps apart. Throws LogError (mismatch) where counts
+  /// or sizes do not fit the schema; the next frame is then a keyframe.
   virtual std::vector<EncodedField> encode(const FrameView& frame, bool& keyframe) = 0;
 };
 
@@ -42,8 +53,10 @@ class FrameDecoder {
  public:
   static std::unique_ptr<FrameDecoder> create(const Schema& schema, const CodecLimits& limits = {});
   virtual ~FrameDecoder() = default;
-  /// Decodes one record; the result is valid until the next call. Hostile input ends in LogError
-  /// (damaged or limit), never in a crash or an allocation above the limits.
+  /// Decodes one record; the result is valid until the next call and holds no table rows. Hostile
+  /// input ends in LogError (damaged or limit; path empty), never in a crash. Memory stays below 16
+  /// times the declared sizes of the fields, each of which is limited. After a failure only a
+  /// keyframe is accepted.
   virtual const Frame& decode(std::span<const EncodedField> fields, bool keyframe,
                               std::uint64_t step, double time, double dt) = 0;
 };
