@@ -7,7 +7,6 @@
 
 #include "io/errors.h"
 #include "io/frame_diff.h"
-#include "tools/cli.h"
 
 namespace varve::tools {
 
@@ -103,8 +102,9 @@ std::string describe(const Mismatch& mismatch) {
 }
 
 Divergence::Divergence(const std::string& path, Mismatch found)
-    : std::runtime_error(path + ": re-execution differs from the record first at " +
-                         describe(found)),
+    : ToolError(exit_differ,
+                path + ": re-execution differs from the record first at " +
+                    describe(found)),
       mismatch(std::move(found)) {}
 
 std::optional<Mismatch> first_difference(const io::Schema& schema, const io::FrameView& recorded,

@@ -6,7 +6,6 @@
 #include <functional>
 #include <memory>
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -14,16 +13,17 @@
 #include "io/engine.h"
 #include "io/log_reader.h"
 #include "io/log_writer.h"
+#include "tools/cli.h"
 
 namespace varve::tools {
 
 /// Thrown by an engine's advance() where it cannot go on; its state is then that of the last good
 /// step. `details` are key/value pairs for machine-readable output (criterion, field, id, ...).
-class EngineFailure : public std::runtime_error {
+class EngineFailure : public ToolError {
  public:
   explicit EngineFailure(const std::string& text,
                          std::vector<std::pair<std::string, std::string>> facts = {})
-      : std::runtime_error(text), details(std::move(facts)) {}
+      : ToolError(exit_numerical, text), details(std::move(facts)) {}
   std::vector<std::pair<std::string, std::string>> details;
 };
 
@@ -45,7 +45,7 @@ struct Mismatch {
 std::string describe(const Mismatch& mismatch);
 
 /// Re-executing recorded steps gave other bits than the record: exit 1 in every verb.
-class Divergence : public std::runtime_error {
+class Divergence : public ToolError {
  public:
   Divergence(const std::string& path, Mismatch found);
   Mismatch mismatch;
