@@ -103,7 +103,7 @@ std::vector<Problem> set_changed_keys(Scenario& scenario, const Settings& settin
       continue;
     }
     if (std::any_of(settings.begin(), settings.begin() + static_cast<std::ptrdiff_t>(i),
-                    [&](const auto& earlier) { return earlier.first == key; })) {
+                    [&key = key](const auto& earlier) { return earlier.first == key; })) {
       problems.push_back({key, "given twice"});
       continue;
     }
