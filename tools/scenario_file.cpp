@@ -197,7 +197,7 @@ class ScenarioReader {
     core::Scenario scratch;
     if (const auto problem = core::set_parameter(scratch, *parameter, value))
       return error(place, place.value_column, key + ": " + problem->text);
-    std::erase_if(change.settings, [&](const auto& setting) { return setting.first == inner; });
+    std::erase_if(change.settings, [&inner = inner](const auto& setting) { return setting.first == inner; });
     change.settings.emplace_back(inner, value);
   }
 
