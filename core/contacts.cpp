@@ -320,5 +320,7 @@ Vec<double, D> Contacts<D, P>::wall_impulse() const {
 }
 
 template class Contacts<2, DoublePrecision>;
+template class Contacts<2, FloatPrecision>;
+template class Contacts<2, MixedPrecision>;
 
 }  // namespace varve::core

@@ -194,5 +194,7 @@ void CouplingStage<D, P>::set_drag(std::span<const Vec<double, D>> mean_drag) {
 }
 
 template class CouplingStage<2, DoublePrecision>;
+template class CouplingStage<2, FloatPrecision>;
+template class CouplingStage<2, MixedPrecision>;
 
 }  // namespace varve::core

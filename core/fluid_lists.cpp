@@ -46,5 +46,6 @@ void FluidLists<D, Position>::rebuild(std::span<const Vec<Position, D>> fluid,
 }
 
 template class FluidLists<2, double>;
+template class FluidLists<2, float>;
 
 }  // namespace varve::core

@@ -83,7 +83,6 @@ void place_fluid(const Scenario& s, DoubleState& state) {
   const double dx = s.fluid.spacing;
   const Box<2> box = domain_box(s);
   const std::int64_t columns = whole_spacings("domain.width", s.domain.width, dx);
-  whole_spacings("domain.height", s.domain.height, dx);
   const std::int64_t rows = nearest_integer(s.fluid.level / dx);
   for (std::int64_t j = 0; j < rows; ++j)
     for (std::int64_t i = 0; i < columns; ++i) {

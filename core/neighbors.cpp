@@ -130,5 +130,9 @@ template class CellGrid<2, double>;
 template Rows candidates<2, double>(std::span<const Vec<double, 2>>,
                                     std::span<const Vec<double, 2>>, const CellGrid<2, double>&,
                                     double, const Periodicity<2>&, bool, Workers&);
+template class CellGrid<2, float>;
+template Rows candidates<2, float>(std::span<const Vec<float, 2>>, std::span<const Vec<float, 2>>,
+                                   const CellGrid<2, float>&, double, const Periodicity<2>&, bool,
+                                   Workers&);
 
 }  // namespace varve::core

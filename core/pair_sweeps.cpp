@@ -48,5 +48,9 @@ PairSweeps<D, P> pair_sweeps(Kernel kernel, bool periodic, InstructionSet set) {
 
 template PairSweeps<2, DoublePrecision> pair_sweeps<2, DoublePrecision>(Kernel, bool,
                                                                         InstructionSet);
+template PairSweeps<2, FloatPrecision> pair_sweeps<2, FloatPrecision>(Kernel, bool,
+                                                                      InstructionSet);
+template PairSweeps<2, MixedPrecision> pair_sweeps<2, MixedPrecision>(Kernel, bool,
+                                                                      InstructionSet);
 
 }  // namespace varve::core

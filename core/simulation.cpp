@@ -27,9 +27,13 @@ namespace {
 /// Calls `make` with the dimension and precision of the scenario as types.
 template <class Make>
 auto dispatch(const Scenario& scenario, Make&& make) {
-  if (scenario.domain.dimension != 2 || scenario.precision != Precision::double_)
+  if (scenario.domain.dimension != 2)
     throw ModelError("domain.dimension = " + std::to_string(scenario.domain.dimension) +
-                     " with this scenario.precision is not built in; 2 with double is");
+                     " is not built in; 2 is");
+  if (scenario.precision == Precision::float_)
+    return make(std::integral_constant<int, 2>{}, FloatPrecision{});
+  if (scenario.precision == Precision::mixed)
+    return make(std::integral_constant<int, 2>{}, MixedPrecision{});
   return make(std::integral_constant<int, 2>{}, DoublePrecision{});
 }
 

@@ -66,7 +66,11 @@ std::vector<WallDummy<2>> wall_dummies(const Scenario& scenario, int layers) {
   const double dx = scenario.fluid.spacing;
   const Box<2> box = domain_box(scenario);
   const std::int64_t columns = whole_spacings("domain.width", d.width, dx);
-  const std::int64_t rows = whole_spacings("domain.height", d.height, dx);
+  // A height that is no multiple of dx is legal where the fluid does not reach the top.
+  const double exact_rows = d.height / dx;
+  const double whole_rows =
+      d.top == Boundary::free ? std::ceil(exact_rows - 1e-6) : std::floor(exact_rows + 1e-6);
+  const auto rows = static_cast<std::int64_t>(whole_rows);
   const std::int64_t beside = is_wall(d.sides) ? layers : 0;
   const std::int64_t below = is_wall(d.bottom) ? layers : 0;
   const std::int64_t above = is_wall(d.top) ? layers : 0;
