@@ -22,7 +22,7 @@ int self_test(const Invocation& invocation) {
   const SelfTest test = run_self_test(*log, invocation.count("plants").value_or(0), window_steps,
                                       invocation.count("seed").value_or(0));
   if (invocation.globals.json) {
-    const nlohmann::ordered_json out{{"schema", "varve.diff.self_test.1"},
+    const nlohmann::ordered_json out{{"schema", "varve.diff.self_test/1"},
                                      {"passed", test.passed()},
                                      {"planted", std::to_string(test.planted)},
                                      {"located", std::to_string(test.located)},

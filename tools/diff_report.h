@@ -79,7 +79,7 @@ std::string headline(const DiffReport& report);
 
 /// Headline, genesis differences, counts per field, growth, notes. `bold_first`: headline in bold.
 std::string text_report(const DiffReport& report, bool quiet);
-/// One object; schema "varve.diff.1".
+/// One object; schema "varve.diff/1".
 std::string json_report(const DiffReport& report);
 /// A suite with one case per compared field and one for the comparison as a whole.
 std::string junit_report(const DiffReport& report, double seconds);

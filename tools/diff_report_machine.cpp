@@ -104,7 +104,7 @@ std::vector<Case> cases_of(const DiffReport& report) {
 
 std::string json_report(const DiffReport& report) {
   json out;
-  out["schema"] = "varve.diff.1";
+  out["schema"] = "varve.diff/1";
   out["a"] = report.a;
   out["b"] = report.b;
   out["verdict"] = std::string(name_of(report.verdict));

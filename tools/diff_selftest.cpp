@@ -1,43 +1,17 @@
 #include "tools/diff_selftest.h"
 
 #include <algorithm>
-#include <cstdlib>
-#include <filesystem>
 #include <random>
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include "io/log_writer.h"
 #include "tools/cli.h"
 #include "tools/diff_run.h"
+#include "tools/scratch_folder.h"
 
 namespace varve::tools {
 namespace {
-
-namespace fs = std::filesystem;
-
-// A folder that goes away with everything in it.
-class ScratchFolder {
- public:
-  ScratchFolder() {
-    std::string name = (fs::temp_directory_path() / "varve-self-test-XXXXXX").string();
-    if (mkdtemp(name.data()) == nullptr)
-      throw ToolError(exit_output, fmt::format("no scratch folder can be made in {}",
-                                               fs::temp_directory_path().string()));
-    path_ = name;
-  }
-  ~ScratchFolder() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  ScratchFolder(const ScratchFolder&) = delete;
-  ScratchFolder& operator=(const ScratchFolder&) = delete;
-  std::string file(const char* name) const { return (path_ / name).string(); }
-
- private:
-  fs::path path_;
-};
 
 struct Plant {
   std::size_t frame = 0, field = 0;
