@@ -233,6 +233,11 @@ std::vector<std::pair<std::string, std::string>> all_settings(const Scenario& sc
     } else {
       all.emplace_back(section + "at", number_text(change.at));
     }
+    if (change.anchor != 0)
+      all.emplace_back(section + "anchor", change.anchor < 0 ? "left" : "right");
+    if (change.outside != OutsideMode::error)
+      all.emplace_back(section + "outside",
+                       change.outside == OutsideMode::push ? "push" : "remove");
     for (const auto& [key, value] : change.settings) all.emplace_back(section + key, value);
   }
   return all;

@@ -308,7 +308,7 @@ class Resolver {
   }
 
   void apply_change(Scenario& now, ScheduledChange& change) {
-    for (const Problem& found : apply_settings(now, change.settings))
+    for (const Problem& found : apply_settings(now, change.settings, change.anchor))
       problem("event." + change.name + "." + found.key, found.text);
     // Values in their canonical form, so that equal scenarios have equal texts.
     for (auto& [key, value] : change.settings) {

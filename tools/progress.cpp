@@ -80,9 +80,9 @@ void Progress::finish() {
 void Progress::show(const ProgressPoint& point, double wall_s) {
   shown_ = true;
   switch (mode_) {
-    case ProgressMode::bar: std::fputs(("\r" + bar(point, wall_s) + "\x1b[K").c_str(), stderr); break;
-    case ProgressMode::json: std::fputs((json(point, wall_s) + "\n").c_str(), stderr); break;
-    default: std::fputs((title_ + ": " + line(point, wall_s) + "\n").c_str(), stderr); break;
+    case ProgressMode::bar: fmt::print(stderr, "\r{}\x1b[K", bar(point, wall_s)); break;
+    case ProgressMode::json: fmt::print(stderr, "{}\n", json(point, wall_s)); break;
+    default: fmt::print(stderr, "{}: {}\n", title_, line(point, wall_s)); break;
   }
   std::fflush(stderr);
 }
@@ -136,7 +136,7 @@ std::string Progress::bar(const ProgressPoint& point, double wall_s) const {
   if (r.fraction) {
     constexpr std::size_t width = 16;
     const auto filled = static_cast<std::size_t>(*r.fraction * static_cast<double>(width));
-    text += "[" + std::string(filled, '#') + std::string(width - filled, '.') + "] ";
+    text += fmt::format("[{:#<{}}{:.<{}}] ", "", filled, "", width - filled);
   }
   text += line(point, wall_s);
   const std::size_t columns = terminal_columns();

@@ -71,10 +71,13 @@ class ScenarioReader {
     }
   }
 
+  const core::Scenario& written() const { return scenario_; }
+
   /// Resolves, or throws ScenarioError with everything that was found.
-  core::Scenario finish(const std::string& source, bool needs_length) {
+  core::Scenario finish(const std::string& source, const ScenarioOptions& options) {
     source_ = source;
-    check_length(needs_length);
+    check_length(options.needs_length);
+    if (options.resolved && errors_.empty()) return std::move(scenario_);
     if (errors_.empty()) {
       for (const core::Problem& problem : core::resolve(scenario_))
         report(problem.key, problem.text);
@@ -184,6 +187,7 @@ class ScenarioReader {
                    fmt::format("unknown key '{}'; expected event.NAME.KEY", key));
     core::ScheduledChange& change = event(name);
     if (inner == "at" || inner == "at_step") return set_moment(change, inner, value, key, place);
+    if (inner == "anchor" || inner == "outside") return set_width_rule(change, inner, value, key, place);
     const core::Parameter* parameter = core::find_parameter(inner);
     if (!parameter) {
       const std::string_view nearest = core::nearest_key(inner);
@@ -199,6 +203,27 @@ class ScenarioReader {
       return error(place, place.value_column, key + ": " + problem->text);
     std::erase_if(change.settings, [&inner = inner](const auto& setting) { return setting.first == inner; });
     change.settings.emplace_back(inner, value);
+  }
+
+  /// How an event's change of width is made: which wall stays, what becomes of grains outside.
+  void set_width_rule(core::ScheduledChange& change, const std::string& inner,
+                      const std::string& value, const std::string& key, const Place& place) {
+    const bool is_anchor = inner == "anchor";
+    const std::vector<std::string_view> names =
+        is_anchor ? std::vector<std::string_view>{"left", "none", "right"}
+                  : std::vector<std::string_view>{"error", "push", "remove"};
+    places_.insert_or_assign(key, place);
+    const auto found = std::find(names.begin(), names.end(), value);
+    if (found == names.end())
+      return error(place, place.value_column,
+                   fmt::format("{}: '{}' is not known; expected {}, {} or {}", key, value, names[0],
+                               names[1], names[2]));
+    const int index = static_cast<int>(found - names.begin());
+    if (is_anchor) {
+      change.anchor = index - 1;
+    } else {
+      change.outside = static_cast<core::OutsideMode>(index);
+    }
   }
 
   /// The moment of an event, read like time.until and time.steps.
@@ -294,7 +319,8 @@ ScenarioSource read_scenario_text(std::string_view text, const std::string& name
   reader.take_text(text, name);
   reader.take_settings(options.settings);
   ScenarioSource source;
-  source.scenario = reader.finish(name, options.needs_length);
+  source.written = reader.written();
+  source.scenario = reader.finish(name, options);
   source.name = name;
   source.text = text;
   return source;

@@ -35,6 +35,7 @@ class ScenarioError : public std::runtime_error {
 /// A resolved scenario and where it came from.
 struct ScenarioSource {
   core::Scenario scenario;  ///< resolved
+  core::Scenario written;   ///< as given, with what was left open still open
   std::string name;         ///< path, or "preset NAME"
   std::string text;         ///< as read
   /// Other files that it names, to be embedded in genesis: name, content.
@@ -45,11 +46,14 @@ struct ScenarioOptions {
   std::vector<std::string> settings;  ///< "KEY=VALUE" of -s, in order; they win over the file
   /// time.until or time.steps must be given. A caller that sets the length of the run says no.
   bool needs_length = true;
+  /// The text is a resolved scenario's canonical one (a genesis): nothing is derived or limited again.
+  /// A fork's scenario need not be one that a fresh run could start with.
+  bool resolved = false;
 };
 
 /// Reads and resolves a scenario held in memory; `name` stands in messages. Throws ScenarioError.
 ScenarioSource read_scenario_text(std::string_view text, const std::string& name,
-                                  const ScenarioOptions& options = {{}, false});
+                                  const ScenarioOptions& options = {{}, false, false});
 
 /// Reads and resolves a file, or the preset of that name where there is no such file. Prints every
 /// error to stderr and throws Exit{3} if it can't be used; UsageError for a missing file or a directory.

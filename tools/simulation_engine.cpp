@@ -142,8 +142,12 @@ void SimulationEngine::change(const std::vector<io::Setting>& settings,
 }
 
 core::Scenario scenario_of(const io::Genesis& genesis, const std::string& path) {
-  const ScenarioSource source = read_scenario_text(genesis.scenario, path + ":genesis");
-  return source.scenario;
+  try {
+    return read_scenario_text(genesis.scenario, path + ":scenario", {{}, false, true}).scenario;
+  } catch (const ScenarioError& error) {
+    throw io::LogError(io::ErrorKind::damaged, path,
+                       fmt::format("its scenario can't be read back:\n{}", error.what()));
+  }
 }
 
 io::Genesis make_genesis(const core::Scenario& resolved, const io::Schema& schema,
