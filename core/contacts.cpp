@@ -64,7 +64,7 @@ void Contacts<D, P>::build_list(const Constants<D>& c, const std::vector<WallPla
   const std::span<const Vec<Position, D>> points(grains.position);
   CellGrid<D, Position> cells;
   cells.build(points, reach, c.period);
-  const Rows rows = candidates<D, Position>(points, points, cells, reach, c.period, true, alone);
+  const Rows rows = candidates<D, Position>(points, cells, reach, c.period, true, alone);
   std::vector<Slot> old;
   old.swap(slots_);
   std::vector<std::vector<std::uint32_t>> pairs(grains.size()), with_walls(grains.size());

@@ -46,11 +46,11 @@ void CouplingStage<D, P>::rebuild(const Constants<D>& c, const State<D, P>& stat
   // The coupling's support is wider than the fluid's: cells of its own, or Rc would be cut short.
   CellGrid<D, Position> cells;
   cells.build(fluid, radius, c.period);
-  fluid_of_ = candidates<D, Position>(grains, fluid, cells, radius, c.period, false, workers);
+  fluid_of_ = candidates<D, Position>(grains, cells, radius, c.period, false, workers);
   cells.build(walls, radius, c.period);
-  walls_of_ = candidates<D, Position>(grains, walls, cells, radius, c.period, false, workers);
+  walls_of_ = candidates<D, Position>(grains, cells, radius, c.period, false, workers);
   cells.build(grains, radius, c.period);
-  grains_of_ = candidates<D, Position>(grains, grains, cells, radius, c.period, true, workers);
+  grains_of_ = candidates<D, Position>(grains, cells, radius, c.period, true, workers);
   weights_.assign(fluid_of_.index.size(), 0);
   near_start_.assign(fluid.size() + 1, 0);
   for (const std::int32_t a : fluid_of_.index) ++near_start_[static_cast<std::size_t>(a) + 1];

@@ -35,12 +35,12 @@ void FluidLists<D, Position>::rebuild(std::span<const Vec<Position, D>> fluid,
   const double radius = support + skin;
   CellGrid<D, Position> fluid_cells, wall_cells;
   fluid_cells.build(fluid, radius, period);
-  fluid_.assign(candidates<D, Position>(fluid, fluid, fluid_cells, radius, period, true, workers),
+  fluid_.assign(candidates<D, Position>(fluid, fluid_cells, radius, period, true, workers),
                 fluid.size(), Filler::own_index, 0);
   wall_cells.build(walls, radius, period);
-  walls_.assign(candidates<D, Position>(fluid, walls, wall_cells, radius, period, false, workers),
+  walls_.assign(candidates<D, Position>(fluid, wall_cells, radius, period, false, workers),
                 fluid.size(), Filler::one_past, static_cast<std::int32_t>(walls.size()));
-  wall_rows_ = candidates<D, Position>(walls, fluid, fluid_cells, radius, period, false, workers);
+  wall_rows_ = candidates<D, Position>(walls, fluid_cells, radius, period, false, workers);
   of_walls_.assign(wall_rows_, walls.size(), Filler::minus_one, 0);
   listed_at_.assign(fluid.begin(), fluid.end());
 }

@@ -6,7 +6,7 @@
 namespace varve::core {
 
 template <int D, class Position>
-std::int64_t CellGrid<D, Position>::coordinate(double x, int axis) const {
+std::int64_t CellGrid<D, Position>::cell_along(double x, int axis) const {
   const double scaled = std::floor((x - origin_[axis]) * inverse_cell_[axis]);
   if (!(scaled >= 0)) return 0;
   if (scaled >= static_cast<double>(size_[axis])) return size_[axis] - 1;
@@ -45,59 +45,92 @@ void CellGrid<D, Position>::build(std::span<const Vec<Position, D>> points, doub
   for (std::size_t i = 0; i < points.size(); ++i) {
     std::int64_t index = 0;
     for (int a = D - 1; a >= 0; --a)
-      index = index * size_[a] + coordinate(static_cast<double>(points[i][a]), a);
+      index = index * size_[a] + cell_along(static_cast<double>(points[i][a]), a);
     cell_of[i] = static_cast<std::uint32_t>(index);
     ++start_[cell_of[i] + 1];
   }
   for (std::size_t c = 0; c < total; ++c) start_[c + 1] += start_[c];
-  points_.resize(points.size());
+  fullest_ = 0;
+  for (std::size_t c = 0; c < total; ++c)
+    fullest_ = std::max<std::size_t>(fullest_, start_[c + 1] - start_[c]);
+  ids_.resize(points.size());
+  for (auto& axis : coordinates_) axis.resize(points.size());
   std::vector<std::uint32_t> next(start_.begin(), start_.end() - 1);
-  for (std::size_t i = 0; i < points.size(); ++i)
-    points_[next[cell_of[i]]++] = static_cast<std::uint32_t>(i);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const std::uint32_t place = next[cell_of[i]]++;
+    ids_[place] = static_cast<std::int32_t>(i);
+    for (int a = 0; a < D; ++a) coordinates_[a][place] = static_cast<double>(points[i][a]);
+  }
 }
 
+namespace {
+
+/// Appends the ids of [begin, end) nearer to `point` than the root of `limit`; returns the new end.
+/// Written without a branch on the distance, which is as good as random.
+template <int D, bool periodic>
+std::int32_t* near(const double* const* x, const std::int32_t* ids, std::uint32_t begin,
+                   std::uint32_t end, const double* point, const double* period, double limit,
+                   std::int32_t* out) {
+  for (std::uint32_t k = begin; k < end; ++k) {
+    double r2 = 0;
+    for (int a = 0; a < D; ++a) {
+      double d = point[a] - x[a][k];
+      if constexpr (periodic) {
+        const double length = period[a];
+        d = d > 0.5 * length ? d - length : d;
+        d = d < -0.5 * length ? d + length : d;
+      }
+      r2 += d * d;
+    }
+    *out = ids[k];
+    out += r2 < limit ? 1 : 0;
+  }
+  return out;
+}
+
+}  // namespace
+
 template <int D, class Position>
-Rows candidates(std::span<const Vec<Position, D>> from, std::span<const Vec<Position, D>> to,
-                const CellGrid<D, Position>& grid, double radius, const Periodicity<D>& period,
-                bool same, Workers& workers) {
+Rows candidates(std::span<const Vec<Position, D>> from, const CellGrid<D, Position>& grid,
+                double radius, const Periodicity<D>& period, bool same, Workers& workers) {
   // Each thread fills its own part; the parts are joined in order, so that the result does not depend
   // on how many there are.
-  struct Part {
-    std::size_t begin = 0, end = 0;
-    std::vector<std::int32_t> index;
-  };
-  std::vector<Part> parts(workers.count());
+  std::vector<std::vector<std::int32_t>> parts(workers.count());
   Rows rows;
   rows.start.assign(from.size() + 1, 0);
   const double limit = radius * radius;
+  const double* coordinates[D];
+  for (int a = 0; a < D; ++a) coordinates[a] = grid.coordinates(a);
+  const auto filter = period.any() ? near<D, true> : near<D, false>;
+  constexpr std::size_t cells_around = D == 2 ? 9 : 27;
+  const std::size_t most = cells_around * grid.fullest_cell() + 1;
   workers.run(from.size(), 64, [&](std::size_t begin, std::size_t end, unsigned thread) {
-    Part& part = parts[thread];
-    part.begin = begin;
-    part.end = end;
-    part.index.reserve((end - begin) * 32);
-    std::vector<std::int32_t> found;
+    std::vector<std::int32_t>& part = parts[thread];
+    std::size_t used = 0;
     for (std::size_t i = begin; i < end; ++i) {
-      found.clear();
-      grid.around(from[i], [&](std::uint32_t j) {
-        double r2 = 0;
-        for (int a = 0; a < D; ++a) {
-          double d = static_cast<double>(from[i][a]) - static_cast<double>(to[j][a]);
-          const double length = period.length[a];
-          if (d > 0.5 * length) d -= length;
-          if (d < -0.5 * length) d += length;
-          r2 += d * d;
-        }
-        if (r2 < limit && !(same && j == i)) found.push_back(static_cast<std::int32_t>(j));
+      if (part.size() < used + most) part.resize(std::max(used + most, 2 * part.size()));
+      double point[D];
+      for (int a = 0; a < D; ++a) point[a] = static_cast<double>(from[i][a]);
+      std::int32_t* const first = part.data() + used;
+      std::int32_t* last = first;
+      grid.around(from[i], [&](std::uint32_t from_place, std::uint32_t to_place) {
+        last = filter(coordinates, grid.ids(), from_place, to_place, point, period.length, limit,
+                      last);
       });
-      std::sort(found.begin(), found.end());
-      rows.start[i + 1] = static_cast<std::uint32_t>(found.size());
-      part.index.insert(part.index.end(), found.begin(), found.end());
+      std::sort(first, last);
+      if (same) last = std::remove(first, last, static_cast<std::int32_t>(i));
+      rows.start[i + 1] = static_cast<std::uint32_t>(last - first);
+      used += static_cast<std::size_t>(last - first);
     }
+    part.resize(used);
   });
   for (std::size_t i = 0; i < from.size(); ++i) rows.start[i + 1] += rows.start[i];
+  if (parts.size() == 1) {
+    rows.index = std::move(parts[0]);
+    return rows;
+  }
   rows.index.reserve(rows.start[from.size()]);
-  for (const Part& part : parts)
-    rows.index.insert(rows.index.end(), part.index.begin(), part.index.end());
+  for (const auto& part : parts) rows.index.insert(rows.index.end(), part.begin(), part.end());
   return rows;
 }
 
@@ -127,12 +160,10 @@ void GroupedStorage::assign(const Rows& rows, std::size_t points, Filler filler,
 }
 
 template class CellGrid<2, double>;
-template Rows candidates<2, double>(std::span<const Vec<double, 2>>,
-                                    std::span<const Vec<double, 2>>, const CellGrid<2, double>&,
-                                    double, const Periodicity<2>&, bool, Workers&);
 template class CellGrid<2, float>;
-template Rows candidates<2, float>(std::span<const Vec<float, 2>>, std::span<const Vec<float, 2>>,
-                                   const CellGrid<2, float>&, double, const Periodicity<2>&, bool,
-                                   Workers&);
+template Rows candidates<2, double>(std::span<const Vec<double, 2>>, const CellGrid<2, double>&,
+                                    double, const Periodicity<2>&, bool, Workers&);
+template Rows candidates<2, float>(std::span<const Vec<float, 2>>, const CellGrid<2, float>&,
+                                   double, const Periodicity<2>&, bool, Workers&);
 
 }  // namespace varve::core

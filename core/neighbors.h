@@ -25,7 +25,8 @@ struct Periodicity {
   }
 };
 
-/// Uniform cells over a set of points; ids ascend within a cell.
+/// Uniform cells over a set of points. Coordinates and ids are copied in cell order, a row of cells
+/// after the other, so that the cells around a point are a few contiguous stretches of memory.
 template <int D, class Position>
 class CellGrid {
  public:
@@ -33,18 +34,26 @@ class CellGrid {
   /// a coordinate that is not finite are put in the first cell.
   void build(std::span<const Vec<Position, D>> points, double cell, const Periodicity<D>& period);
 
-  /// Calls visit(id) for all points in the cells within one cell of `point`, not in order of id.
+  /// Calls visit(begin, end) for stretches [begin, end) of the cell-ordered arrays that together hold
+  /// all points within one cell of `point`, each once, in no particular order of id.
   template <class Visit>
   void around(const Vec<Position, D>& point, Visit&& visit) const;
 
+  const double* coordinates(int axis) const { return coordinates_[axis].data(); }
+  const std::int32_t* ids() const { return ids_.data(); }
+  /// Points in the fullest cell: no more than 3^D of these lie around any point.
+  std::size_t fullest_cell() const { return fullest_; }
+
  private:
-  std::int64_t coordinate(double x, int axis) const;
+  std::int64_t cell_along(double x, int axis) const;
 
   double origin_[D] = {}, inverse_cell_[D] = {};
   std::int64_t size_[D] = {};
   bool periodic_[D] = {};
+  std::size_t fullest_ = 0;
   std::vector<std::uint32_t> start_;
-  std::vector<std::uint32_t> points_;
+  std::vector<double> coordinates_[D];
+  std::vector<std::int32_t> ids_;
 };
 
 /// Candidates per point, compressed rows: of point i they are index[start[i] .. start[i+1]).
@@ -56,12 +65,11 @@ struct Rows {
   }
 };
 
-/// For every point of `from`, the points of `to` (whose grid is given) nearer than `radius`,
-/// ascending; a point's own index is left out where `same` says that both sets are one.
+/// For every point of `from`, the points of a grid nearer than `radius` (no more than its cell),
+/// ascending; a point's own index is left out where `same` says that the grid holds the same points.
 template <int D, class Position>
-Rows candidates(std::span<const Vec<Position, D>> from, std::span<const Vec<Position, D>> to,
-                const CellGrid<D, Position>& grid, double radius, const Periodicity<D>& period,
-                bool same, Workers& workers);
+Rows candidates(std::span<const Vec<Position, D>> from, const CellGrid<D, Position>& grid,
+                double radius, const Periodicity<D>& period, bool same, Workers& workers);
 
 /// What short lanes are filled with.
 enum class Filler { own_index, minus_one, one_past };
@@ -87,7 +95,7 @@ void CellGrid<D, Position>::around(const Vec<Position, D>& point, Visit&& visit)
   std::int64_t cells[D][3];
   int counts[D];
   for (int a = 0; a < D; ++a) {
-    const std::int64_t middle = coordinate(static_cast<double>(point[a]), a);
+    const std::int64_t middle = cell_along(static_cast<double>(point[a]), a);
     counts[a] = 0;
     for (std::int64_t step = -1; step <= 1; ++step) {
       std::int64_t c = middle + step;
@@ -102,13 +110,18 @@ void CellGrid<D, Position>::around(const Vec<Position, D>& point, Visit&& visit)
   }
   const int planes = D == 3 ? counts[D - 1] : 1;
   for (int z = 0; z < planes; ++z)
-    for (int y = 0; y < counts[1]; ++y)
-      for (int x = 0; x < counts[0]; ++x) {
-        std::int64_t cell = cells[1][y] * size_[0] + cells[0][x];
-        if constexpr (D == 3) cell += cells[2][z] * size_[0] * size_[1];
-        const auto c = static_cast<std::size_t>(cell);
-        for (std::uint32_t k = start_[c]; k < start_[c + 1]; ++k) visit(points_[k]);
+    for (int y = 0; y < counts[1]; ++y) {
+      std::int64_t row = cells[1][y] * size_[0];
+      if constexpr (D == 3) row += cells[2][z] * size_[0] * size_[1];
+      // Cells side by side in a row are one stretch.
+      for (int x = 0; x < counts[0];) {
+        int last = x;
+        while (last + 1 < counts[0] && cells[0][last + 1] == cells[0][last] + 1) ++last;
+        visit(start_[static_cast<std::size_t>(row + cells[0][x])],
+              start_[static_cast<std::size_t>(row + cells[0][last] + 1)]);
+        x = last + 1;
       }
+    }
 }
 
 }  // namespace varve::core

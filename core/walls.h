@@ -86,7 +86,7 @@ int coupling_dummy_layers(const Scenario& scenario);
 /// `layers` layers of dummies dx apart outside each wall, the first dx/2 outside, corners included,
 /// none beyond periodic sides or a free top. Side walls stand as high as the domain. Row by row
 /// from the bottom, each row from the left. Empty without fluid. Throws ModelError if the domain is
-/// not a whole number of spacings wide and high.
+/// not a whole number of spacings wide.
 std::vector<WallDummy<2>> wall_dummies(const Scenario& scenario, int layers);
 
 /// length / spacing, which must be whole to 1e-6; otherwise throws ModelError naming `key` and the
