@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "core/assessment.h"
 #include "core/parameters.h"
 #include "io/errors.h"
 #include "tools/cli.h"
@@ -158,6 +159,8 @@ io::Genesis make_genesis(const core::Scenario& resolved, const io::Schema& schem
   genesis.schema = schema;
   genesis.scenario = core::canonical_text(resolved);
   genesis.parameters = core::all_settings(resolved);
+  for (const core::ModelUse& model : core::models_of(resolved))
+    if (model.active) genesis.models.emplace_back(model.name, model.reason);
   genesis.tier = resolved.record.tier == core::RecordTier::deltas ? io::Tier::deltas
                                                                   : io::Tier::digests;
   genesis.every = static_cast<std::uint32_t>(resolved.record.every);
