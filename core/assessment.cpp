@@ -111,14 +111,17 @@ class Assessor {
     const double steps = static_cast<double>(a_.steps);
     const double particles = static_cast<double>(a_.fluid_particles + a_.grains);
     const double keyframes = 1 + std::floor(steps / static_cast<double>(s_.record.keyframe_steps));
-    // Measured on settling grains with doubles in 2D: 3 to 10 bytes per particle and step, about half
-    // of it with floats; a keyframe compresses to between 0.6 and 1 of its size. At rest it is far
-    // less, hence the low end.
+    // Settling grains with doubles in 2D take 3 to 10 bytes per particle and step, half of it with
+    // floats, and a keyframe compresses to between 0.6 and 1 of its size; a fluid at rest takes next
+    // to nothing.
+    const bool at_rest = a_.speeds.fluid == 0 && a_.speeds.grains == 0;
+    const double least = at_rest ? 0.01 : 2.5;
     const double per_particle = real / 8 * d / 2;
     const bool digests = s_.record.tier == RecordTier::digests;
     const double deltas = digests ? 0 : steps / static_cast<double>(s_.record.every) * particles;
-    a_.log_bytes_low = 4096 + keyframes * 0.3 * bytes + steps * 120 + deltas * 0.3 * per_particle;
-    a_.log_bytes_high = 8192 + keyframes * bytes + steps * 400 + deltas * 11 * per_particle;
+    a_.log_bytes_low =
+        4096 + keyframes * 0.1 * bytes + steps * 120 + deltas * least * per_particle;
+    a_.log_bytes_high = 8192 + keyframes * bytes + steps * 600 + deltas * 11 * per_particle;
   }
 
   void warn_about_fluid() {

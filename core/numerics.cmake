@@ -9,7 +9,9 @@ add_library(varve_numerics INTERFACE)
 target_compile_options(varve_numerics INTERFACE
   -ffp-contract=off -fno-math-errno -fno-trapping-math)
 
-# For our own sources only.
+# For our own sources only. g++ 12 sees overlapping copies in "text" + std::string() where there are
+# none (its bug 105651).
 add_library(varve_warnings INTERFACE)
 target_compile_options(varve_warnings INTERFACE
-  -Wall -Wextra -Wpedantic -Wconversion -Wshadow $<$<BOOL:${VARVE_WERROR}>:-Werror>)
+  -Wall -Wextra -Wpedantic -Wconversion -Wshadow
+  $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict> $<$<BOOL:${VARVE_WERROR}>:-Werror>)

@@ -242,7 +242,8 @@ void check_arguments(const Invocation& invocation, const Verb& verb) {
 
 void complain(std::string_view text) {
   std::fflush(stdout);
-  const std::string line = fmt::format("varve {}: {}\n", verb_name, text);
+  const std::string line =
+      fmt::format("varve{}{}: {}\n", verb_name.empty() ? "" : " ", verb_name, text);
   std::fwrite(line.data(), 1, line.size(), stderr);
 }
 
@@ -374,7 +375,7 @@ int verb_main(int argc, char** argv, const Verb& verb) {
   verb_name = verb.name;
   const int code = guarded(argc, argv, verb);
   if (code == exit_usage && std::ferror(stderr) == 0 && isatty(STDERR_FILENO) != 0)
-    fmt::print(stderr, "(varve {} --help says more)\n", verb.name);
+    fmt::print(stderr, "(varve {}{}--help says more)\n", verb.name, verb.name.empty() ? "" : " ");
   return code;
 }
 

@@ -187,7 +187,8 @@ class ScenarioReader {
                    fmt::format("unknown key '{}'; expected event.NAME.KEY", key));
     core::ScheduledChange& change = event(name);
     if (inner == "at" || inner == "at_step") return set_moment(change, inner, value, key, place);
-    if (inner == "anchor" || inner == "outside") return set_width_rule(change, inner, value, key, place);
+    if (inner == "anchor" || inner == "outside")
+      return set_width_rule(change, inner, value, key, place);
     const core::Parameter* parameter = core::find_parameter(inner);
     if (!parameter) {
       const std::string_view nearest = core::nearest_key(inner);
@@ -201,7 +202,8 @@ class ScenarioReader {
     core::Scenario scratch;
     if (const auto problem = core::set_parameter(scratch, *parameter, value))
       return error(place, place.value_column, key + ": " + problem->text);
-    std::erase_if(change.settings, [&inner = inner](const auto& setting) { return setting.first == inner; });
+    std::erase_if(change.settings,
+                  [&inner = inner](const auto& setting) { return setting.first == inner; });
     change.settings.emplace_back(inner, value);
   }
 
