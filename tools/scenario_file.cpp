@@ -40,8 +40,8 @@ std::pair<std::string, std::string> split_event_key(const std::string& key) {
 
 class ScenarioReader {
  public:
-  /// Takes all entries of one source. A later source wins over an earlier one; within one source a key
-  /// may be set once.
+  /// Takes all entries of one source. A later source wins over an earlier one; within one source a
+  /// key may be set once.
   void take_text(std::string_view text, const std::string& source) {
     const Scan scan = scan_scenario(text, source);
     errors_.insert(errors_.end(), scan.errors.begin(), scan.errors.end());
