@@ -112,8 +112,8 @@ class Assessor {
     const double particles = static_cast<double>(a_.fluid_particles + a_.grains);
     const double keyframes = 1 + std::floor(steps / static_cast<double>(s_.record.keyframe_steps));
     // Settling grains with doubles in 2D take 3 to 10 bytes per particle and step, half of it with
-    // floats, and a keyframe compresses to between 0.6 and 1 of its size; a fluid at rest takes next
-    // to nothing.
+    // floats, and a keyframe compresses to between 0.6 and 1 of its size; a fluid at rest takes
+    // next to nothing.
     const bool at_rest = a_.speeds.fluid == 0 && a_.speeds.grains == 0;
     const double least = at_rest ? 0.01 : 2.5;
     const double per_particle = real / 8 * d / 2;
@@ -143,8 +143,9 @@ class Assessor {
            "comes out up to 45 % too slow; use excess where the domain is closed and full");
     const Lattice lattice = fluid_lattice(s_);
     if (std::min(lattice.columns, lattice.rows) < 10)
-      warn("fluid.spacing", "only " + std::to_string(std::min(lattice.columns, lattice.rows)) +
-                                " particles across the domain; flow between walls needs 10 or more");
+      warn("fluid.spacing",
+           "only " + std::to_string(std::min(lattice.columns, lattice.rows)) +
+               " particles across the domain; flow between walls needs 10 or more");
     if (s_.time.cfl > 0.5)
       warn("time.cfl", number_text(s_.time.cfl) +
                            ": above 0.5 speeds are off by some per cent and dense arrays can fail");
@@ -161,19 +162,23 @@ class Assessor {
     if (!s_.is_coupled()) return;
     const double ratio = s_.coupling.length / s_.grains.diameter;
     if (ratio < 1)
-      warn("coupling.length", rough_number(ratio) + " d: porosity between touching grains becomes "
-                                                    "uneven below one diameter");
+      warn("coupling.length",
+           rough_number(ratio) +
+               " d: porosity between touching grains becomes uneven below one diameter");
     else if (ratio < 3 && s_.coupling.mode == CouplingMode::two_way)
-      warn("coupling.length", rough_number(ratio) +
-                                  " d: a grain disturbs the fluid that it samples; drag laws hold to "
-                                  "a few per cent from 3 d on, one_way at any length");
+      warn("coupling.length",
+           rough_number(ratio) +
+               " d: a grain disturbs the fluid that it samples; drag laws hold to a few per cent "
+               "from 3 d on, one_way at any length");
     if (coupling_radius(s_) < 1.5 * s_.fluid.spacing)
-      warn("fluid.spacing", number_text(s_.fluid.spacing) +
-                                " m leaves a grain with hardly any fluid within its coupling radius " +
-                                rough_number(coupling_radius(s_)) + " m");
+      warn("fluid.spacing",
+           number_text(s_.fluid.spacing) +
+               " m leaves a grain with hardly any fluid within its coupling radius " +
+               rough_number(coupling_radius(s_)) + " m");
     if (s_.domain.width < 2 * coupling_radius(s_))
-      warn("domain.width", number_text(s_.domain.width) +
-                               " m is narrower than two coupling radii: walls cut every grain's view");
+      warn("domain.width",
+           number_text(s_.domain.width) +
+               " m is narrower than two coupling radii: walls cut every grain's view");
     warn_about_drag();
   }
 
@@ -239,8 +244,8 @@ std::vector<ModelUse> models_of(const Scenario& s) {
   add("drag", coupled,
       !alone.empty() ? alone : setting(coupled ? "coupling.drag" : "coupling.mode", s));
   const bool stepped = moving && substeps(s) > 1;
-  add("grain sub-steps", stepped,
-      moving ? std::to_string(substeps(s)) + " per step of " + number_text(s.time.dt) + " s" : still);
+  const std::string often = std::to_string(substeps(s)) + " per step of ";
+  add("grain sub-steps", stepped, moving ? often + number_text(s.time.dt) + " s" : still);
   add("scheduled changes", !s.changes.empty(), std::to_string(s.changes.size()) + " events");
   return models;
 }

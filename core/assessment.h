@@ -1,5 +1,5 @@
-// What a resolved scenario amounts to: which models are on and why, what sets the step, how the flow
-// will be, what to be wary of. For check, info and genesis; nothing here reaches a state.
+// What a resolved scenario amounts to: which models are on and why, what sets the step, how the
+// flow will be, what to be wary of. For check, info and genesis; nothing here reaches a state.
 #pragma once
 
 #include <cstdint>

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include <Eigen/Geometry>
+
 #include "core/simulation.h"
 
 namespace varve::core {
@@ -28,6 +30,13 @@ Vec<double, 2> spin_velocity(const Vec<double, 1>& spin, const Vec<double, 2>& a
 /// Torque of a force at arm r: r x f.
 Vec<double, 1> torque(const Vec<double, 2>& arm, const Vec<double, 2>& force) {
   return Vec<double, 1>(arm[0] * force[1] - arm[1] * force[0]);
+}
+
+Vec<double, 3> spin_velocity(const Vec<double, 3>& spin, const Vec<double, 3>& arm) {
+  return spin.cross(arm);
+}
+Vec<double, 3> torque(const Vec<double, 3>& arm, const Vec<double, 3>& force) {
+  return arm.cross(force);
 }
 
 template <int D, class Position>
@@ -184,6 +193,8 @@ void Contacts<D, P>::evaluate(const Constants<D>& c, const std::vector<WallPlane
     if (slot.touching) {
       slot.record.end = true;
       slot.record.rebound_speed = dot<D>(relative, g.normal);
+      // What the tangential spring still holds goes with it.
+      slot.record.tangential_loss += 0.5 * c.tangential_stiffness * dot<D>(slot.spring, slot.spring);
     }
     slot.touching = false;
     slot.spring.setZero();
@@ -215,18 +226,21 @@ void Contacts<D, P>::evaluate(const Constants<D>& c, const std::vector<WallPlane
     Vec<double, D> spring = slot.spring - dot<D>(slot.spring, g.normal) * g.normal;
     const double flat2 = dot<D>(spring, spring);
     if (flat2 > 0) spring *= std::sqrt(length2 / flat2);
-    const double stored_before = 0.5 * c.tangential_stiffness * dot<D>(spring, spring);
+    const Vec<double, D> before = spring;
     spring += dt * sliding;
     Vec<double, D> force = -c.tangential_stiffness * spring - eta * sliding;
     const double size = std::sqrt(dot<D>(force, force));
-    const bool slips = size > c.friction * normal_force;
-    if (slips) {
+    if (size > c.friction * normal_force) {
       force *= c.friction * normal_force / size;
       if (c.tangential_stiffness > 0) spring = -(force + eta * sliding) / c.tangential_stiffness;
     }
-    const double stored_after = 0.5 * c.tangential_stiffness * dot<D>(spring, spring);
-    const double loss = -dot<D>(force, sliding) * dt - (stored_after - stored_before);
-    (slips ? slot.record.friction_loss : slot.record.tangential_loss) += loss;
+    // Of the displacement, what does not stretch the spring is slip: the slider's work is friction;
+    // what the spring takes and does not store is the dashpot's.
+    const Vec<double, D> stretch = spring - before;
+    const double stored =
+        0.5 * c.tangential_stiffness * (dot<D>(spring, spring) - dot<D>(before, before));
+    slot.record.friction_loss += dot<D>(force, stretch) - dot<D>(force, sliding) * dt;
+    slot.record.tangential_loss += -dot<D>(force, stretch) - stored;
     slot.spring = spring;
     slot.force += force;
     slot.torque_i = torque(arm_i, force);
@@ -322,5 +336,8 @@ Vec<double, D> Contacts<D, P>::wall_impulse() const {
 template class Contacts<2, DoublePrecision>;
 template class Contacts<2, FloatPrecision>;
 template class Contacts<2, MixedPrecision>;
+template class Contacts<3, DoublePrecision>;
+template class Contacts<3, FloatPrecision>;
+template class Contacts<3, MixedPrecision>;
 
 }  // namespace varve::core

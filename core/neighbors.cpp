@@ -13,32 +13,51 @@ std::int64_t CellGrid<D, Position>::cell_along(double x, int axis) const {
   return static_cast<std::int64_t>(scaled);
 }
 
+namespace {
+
+/// Least and largest finite coordinate along an axis; 0 and 0 if there is none.
+template <int D, class Position>
+void bounds(std::span<const Vec<Position, D>> points, int axis, double& low, double& high) {
+  bool first = true;
+  for (const auto& p : points) {
+    const double x = static_cast<double>(p[axis]);
+    if (!std::isfinite(x)) continue;
+    low = first ? x : std::min(low, x);
+    high = first ? x : std::max(high, x);
+    first = false;
+  }
+}
+
+}  // namespace
+
 template <int D, class Position>
 void CellGrid<D, Position>::build(std::span<const Vec<Position, D>> points, double cell,
                                   const Periodicity<D>& period) {
-  std::size_t total = 1;
+  double low[D] = {}, high[D] = {}, cells[D] = {}, total_cells = 1;
   for (int a = 0; a < D; ++a) {
-    double low = 0, high = 0;
     periodic_[a] = period.length[a] > 0;
     if (periodic_[a]) {
-      low = period.origin[a];
-      high = low + period.length[a];
+      low[a] = period.origin[a];
+      high[a] = low[a] + period.length[a];
     } else {
-      bool first = true;
-      for (const auto& p : points) {
-        const double x = static_cast<double>(p[a]);
-        if (!std::isfinite(x)) continue;
-        low = first ? x : std::min(low, x);
-        high = first ? x : std::max(high, x);
-        first = false;
-      }
+      bounds(points, a, low[a], high[a]);
     }
-    // At most a thousand cells along an axis: points that have run away must not cost memory.
-    const double cells = std::clamp(std::floor((high - low) / cell), 1.0, 1024.0);
-    size_[a] = static_cast<std::int64_t>(cells);
-    origin_[a] = low;
-    inverse_cell_[a] = high > low ? cells / (high - low) : 0;
-    total *= static_cast<std::size_t>(size_[a]);
+    cells[a] = std::max(1.0, std::floor((high[a] - low[a]) / cell));
+    total_cells *= cells[a];
+  }
+  // Points that have run away must not cost memory: no more cells than a few per point.
+  const double most = 4 * static_cast<double>(points.size()) + 4096;
+  while (total_cells > most) {
+    double* const longest = std::max_element(cells, cells + D);
+    total_cells /= *longest;
+    *longest = std::max(1.0, std::floor(0.5 * *longest));
+    total_cells *= *longest;
+  }
+  const auto total = static_cast<std::size_t>(total_cells);
+  for (int a = 0; a < D; ++a) {
+    size_[a] = static_cast<std::int64_t>(cells[a]);
+    origin_[a] = low[a];
+    inverse_cell_[a] = high[a] > low[a] ? cells[a] / (high[a] - low[a]) : 0;
   }
   std::vector<std::uint32_t> cell_of(points.size());
   start_.assign(total + 1, 0);
@@ -161,9 +180,15 @@ void GroupedStorage::assign(const Rows& rows, std::size_t points, Filler filler,
 
 template class CellGrid<2, double>;
 template class CellGrid<2, float>;
+template class CellGrid<3, double>;
+template class CellGrid<3, float>;
 template Rows candidates<2, double>(std::span<const Vec<double, 2>>, const CellGrid<2, double>&,
                                     double, const Periodicity<2>&, bool, Workers&);
 template Rows candidates<2, float>(std::span<const Vec<float, 2>>, const CellGrid<2, float>&,
                                    double, const Periodicity<2>&, bool, Workers&);
+template Rows candidates<3, double>(std::span<const Vec<double, 3>>, const CellGrid<3, double>&,
+                                    double, const Periodicity<3>&, bool, Workers&);
+template Rows candidates<3, float>(std::span<const Vec<float, 3>>, const CellGrid<3, float>&,
+                                   double, const Periodicity<3>&, bool, Workers&);
 
 }  // namespace varve::core

@@ -98,7 +98,7 @@ void add_scene(std::vector<Parameter>& table) {
   add(real("gravity.magnitude", "m/s2", acceleration, {0, 1e6}, given, Change::parameter,
            VARVE_REAL(gravity.magnitude), "0: none"));
   add(real("gravity.tilt", "rad", pure, {-3.2, 3.2}, given, Change::parameter,
-           VARVE_REAL(gravity.tilt), "direction, from straight down towards +x; 'deg' is understood"));
+           VARVE_REAL(gravity.tilt), "direction, from straight down towards +x"));
 
   add(flag("fluid.present", Change::never, VARVE_FLAG(fluid.present),
            "off: a scene of grains only, no fluid is built, run or recorded"));
@@ -197,7 +197,7 @@ void add_coupling(std::vector<Parameter>& table) {
   add(whole("time.substeps", {0, 1e6}, Change::never, VARVE_WHOLE(time.substeps),
             "grain sub-steps per step; 0: thirty to a contact"));
   add(real("time.until", "s", time_dimension, {0, huge}, automatic_ok, Change::outputs,
-           VARVE_REAL(time.until), "end of the run: the first step not before it; auto: time.steps"));
+           VARVE_REAL(time.until), "end of the run: the first step not before it"));
   add(whole("time.steps", {0, steps_max}, Change::outputs, VARVE_WHOLE(time.steps),
             "length of the run in steps; 0: time.until"));
 

@@ -99,7 +99,8 @@ class Resolver {
     if (!s_.has_fluid()) return;
     if (std::isnan(s_.fluid.level)) s_.fluid.level = s_.domain.height;
     if (s_.fluid.level > s_.domain.height * (1 + rounding))
-      problem("fluid.level", number_text(s_.fluid.level) + " m is above the domain; largest value " +
+      problem("fluid.level", number_text(s_.fluid.level) +
+                                 " m is above the domain; largest value " +
                                  number_text(s_.domain.height) + " m (domain.height)");
     if (s_.domain.top == Boundary::periodic && s_.fluid.level < s_.domain.height)
       problem("fluid.level", "bottom and top are periodic: the domain must be full; expected " +
@@ -133,15 +134,17 @@ class Resolver {
 
   void resolve_grains() {
     if (!s_.has_grains()) return;
-    const double count = static_cast<double>(s_.grains.rows) * static_cast<double>(s_.grains.columns);
+    const double rows = static_cast<double>(s_.grains.rows);
+    const double columns = static_cast<double>(s_.grains.columns);
+    const double count = rows * columns;
     if (count > grains_max) {
       problem("grains.rows", rough_number(count) + " grains; at most " + rough_number(grains_max) +
                                  " are possible");
       return;
     }
     const double pitch = grain_pitch(s_);
-    const double half_width = 0.5 * static_cast<double>(s_.grains.columns - 1) * pitch;
-    const double array_height = static_cast<double>(s_.grains.rows - 1) * pitch;
+    const double half_width = 0.5 * (columns - 1) * pitch;
+    const double array_height = (rows - 1) * pitch;
     if (std::isnan(s_.grains.centre_x))
       s_.grains.centre_x = s_.domain.left + 0.5 * s_.domain.width;
     if (std::isnan(s_.grains.lowest_y))
