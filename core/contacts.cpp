@@ -228,19 +228,19 @@ void Contacts<D, P>::evaluate(const Constants<D>& c, const std::vector<WallPlane
     if (flat2 > 0) spring *= std::sqrt(length2 / flat2);
     const Vec<double, D> before = spring;
     spring += dt * sliding;
+    const Vec<double, D> tried = spring;
     Vec<double, D> force = -c.tangential_stiffness * spring - eta * sliding;
     const double size = std::sqrt(dot<D>(force, force));
     if (size > c.friction * normal_force) {
       force *= c.friction * normal_force / size;
       if (c.tangential_stiffness > 0) spring = -(force + eta * sliding) / c.tangential_stiffness;
     }
-    // Of the displacement, what does not stretch the spring is slip: the slider's work is friction;
-    // what the spring takes and does not store is the dashpot's.
-    const Vec<double, D> stretch = spring - before;
+    // What the spring is shortened by is slip, and the slider's work on it friction; what the spring
+    // takes and does not store is the dashpot's.
     const double stored =
         0.5 * c.tangential_stiffness * (dot<D>(spring, spring) - dot<D>(before, before));
-    slot.record.friction_loss += dot<D>(force, stretch) - dot<D>(force, sliding) * dt;
-    slot.record.tangential_loss += -dot<D>(force, stretch) - stored;
+    slot.record.friction_loss -= dot<D>(force, tried - spring);
+    slot.record.tangential_loss -= dot<D>(force, spring - before) + stored;
     slot.spring = spring;
     slot.force += force;
     slot.torque_i = torque(arm_i, force);
