@@ -1,4 +1,5 @@
-// What this program was built from and runs on: shown by --version, recorded in genesis, never digested.
+// What this program was built from and runs on: shown by --version, recorded in genesis, never
+// digested.
 #include <ctime>
 #include <string>
 #include <utility>

@@ -82,7 +82,8 @@ std::string report(const ScenarioSource& source, const core::Assessment& a) {
     text += row("mass", fmt::format("{:.6g} kg{}", a.fluid_mass, per));
     text += row("expected speed", fmt::format("{:.4g} m/s  {}", a.speeds.fluid,
                                               a.speeds.fluid_reason));
-    text += row("sound speed", fmt::format("{:.6g} m/s (Mach {:.3g})", s.fluid.sound_speed, a.mach));
+    text += row("sound speed",
+                fmt::format("{:.6g} m/s (Mach {:.3g})", s.fluid.sound_speed, a.mach));
   }
   if (s.has_grains()) text += grains_text(s, a);
   text += "\ntime step\n";

@@ -209,7 +209,8 @@ Invocation parse(int argc, char** argv, const Verb& verb) {
   const std::vector<OptionSpec> options = all_options(verb);
   Invocation invocation;
   for (const OptionSpec& option : options)
-    if (!option.fallback.empty()) invocation.fallbacks.emplace_back(long_name(option), option.fallback);
+    if (!option.fallback.empty())
+      invocation.fallbacks.emplace_back(long_name(option), option.fallback);
   for (const auto& item : split(argc, argv, options)) {
     if (item.position_key >= 0) {
       invocation.arguments.insert(invocation.arguments.end(), item.value.begin(), item.value.end());

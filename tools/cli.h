@@ -34,8 +34,8 @@ class UsageError : public std::runtime_error {
 };
 
 /// Any other failure with a documented exit code: printed as "varve VERB: text". Verbs that compute
-/// translate the engine's failures into it (5 for a numerical failure, 2 for a change that is refused),
-/// since this file links no physics.
+/// translate the engine's failures into it (5 for a numerical failure, 2 for a change that is
+/// refused), since this file links no physics.
 class ToolError : public std::runtime_error {
  public:
   ToolError(int code, const std::string& text) : std::runtime_error(text), code_(code) {}
@@ -97,13 +97,13 @@ struct Verb {
 };
 
 /// Parses, runs, catches: LogError, UsageError, ToolError and Exit become a message on stderr
-/// ("varve VERB: ...") and the documented exit code. --help and --version are answered here, also where
-/// the rest of the command line is incomplete. SIGPIPE is ignored: a reader of standard output that has
-/// had enough ends the verb with success, at the next print() or at the end.
+/// ("varve VERB: ...") and the documented exit code. --help and --version are answered here, also
+/// where the rest of the command line is incomplete. SIGPIPE is ignored: a reader of standard
+/// output that has had enough ends the verb with success, at the next print() or at the end.
 int verb_main(int argc, char** argv, const Verb& verb);
 
-/// Writes to standard output. Ends the verb (with success) where the reader has gone, and with exit 74
-/// where the output cannot be written.
+/// Writes to standard output. Ends the verb (with success) where the reader has gone, and with exit
+/// 74 where the output cannot be written.
 void print(std::string_view text);
 /// "varve VERB: text" on standard error, unless -q.
 void note(const Globals& globals, std::string_view text);
@@ -121,8 +121,8 @@ std::string bold(const Globals& globals, std::string_view text);
 std::string executable_folder();
 /// "0.1.0"
 std::string version_text();
-/// What genesis records beside the digested part: version, compiler, flags, build type, C library, CPU
-/// and its features, host, date.
+/// What genesis records beside the digested part: version, compiler, flags, build type, C library,
+/// CPU and its features, host, date.
 std::vector<std::pair<std::string, std::string>> build_facts();
 
 }  // namespace varve::tools

@@ -289,7 +289,7 @@ std::string read_file(const std::string& path) {
     throw UsageError(fmt::format("{}: {}; expected a scenario file or one of the presets {}", path,
                                  std::strerror(errno), fmt::join(names, ", ")));
   }
-  constexpr std::size_t bytes_max = std::size_t{1} << 21;  // beyond what the scan takes, not all of it
+  constexpr std::size_t bytes_max = std::size_t{1} << 21;  // more than the scan takes
   std::string text(bytes_max, '\0');
   file.read(text.data(), static_cast<std::streamsize>(bytes_max));
   text.resize(static_cast<std::size_t>(file.gcount()));

@@ -1,5 +1,6 @@
-// Scenario files: INI sections with units, read through Boost.Program_options with a scan in front of it
-// that knows where everything stands, so that every error is reported at once with its position.
+// Scenario files: INI sections with units, read through Boost.Program_options with a scan in front
+// of it that knows where everything stands, so that every error is reported at once with its
+// position.
 #pragma once
 
 #include <stdexcept>
@@ -12,8 +13,8 @@
 
 namespace varve::tools {
 
-/// One finding. `line` 0: the source as a whole; `column` 0: the line as a whole. Both from 1, columns
-/// in bytes.
+/// One finding. `line` 0: the source as a whole; `column` 0: the line as a whole. Both from 1,
+/// columns in bytes.
 struct Diagnostic {
   std::string source;  ///< path, "preset NAME", or "<command line>"
   int line = 0, column = 0;
@@ -46,8 +47,8 @@ struct ScenarioOptions {
   std::vector<std::string> settings;  ///< "KEY=VALUE" of -s, in order; they win over the file
   /// time.until or time.steps must be given. A caller that sets the length of the run says no.
   bool needs_length = true;
-  /// The text is a resolved scenario's canonical one (a genesis): nothing is derived or limited again.
-  /// A fork's scenario need not be one that a fresh run could start with.
+  /// The text is a resolved scenario's canonical one (a genesis): nothing is derived or limited
+  /// again. A fork's scenario need not be one that a fresh run could start with.
   bool resolved = false;
 };
 
@@ -56,8 +57,10 @@ ScenarioSource read_scenario_text(std::string_view text, const std::string& name
                                   const ScenarioOptions& options = {{}, false, false});
 
 /// Reads and resolves a file, or the preset of that name where there is no such file. Prints every
-/// error to stderr and throws Exit{3} if it can't be used; UsageError for a missing file or a directory.
-ScenarioSource load_scenario(const std::string& path_or_preset, const ScenarioOptions& options = {});
+/// error to stderr and throws Exit{3} if it can't be used; UsageError for a missing file or a
+/// directory.
+ScenarioSource load_scenario(const std::string& path_or_preset,
+                             const ScenarioOptions& options = {});
 
 /// Built-in scenarios: the shipped files, embedded when varve was built.
 struct Preset {

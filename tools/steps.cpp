@@ -109,7 +109,8 @@ double parse_seconds(std::string_view text, std::string_view what) {
   }
   const std::optional<double> number = decimal(text);
   if (!number)
-    throw UsageError(fmt::format("{}: expected a time, such as 1.2s or 300ms, got '{}'", what, given));
+    throw UsageError(
+        fmt::format("{}: expected a time, such as 1.2s or 300ms, got '{}'", what, given));
   return divides ? *number / factor : *number * factor;
 }
 

@@ -15,8 +15,8 @@ inline constexpr const char* step_forms =
 /// The step of `log` that `text` names: "12000", "t=1.2s" (the last step not after it), "50%" (from
 /// the first to the last step), "first", "last", "first+10", "last-100", "first-contact" (the first
 /// step in which a contact begins), "last-good" (the last whole state). UsageError if it is none of
-/// these, or a step that the log does not hold; with `may_precede`, steps before the log's first are
-/// let through (they are in a parent's log).
+/// these, or a step that the log does not hold; with `may_precede`, steps before the log's first
+/// are let through (they are in a parent's log).
 std::uint64_t parse_step(std::string_view text, const io::LogReader& log, bool may_precede = false);
 
 /// Steps first, first + stride, ... not beyond last.
@@ -26,7 +26,8 @@ struct StepRange {
 /// "A:B:S", "A:B", "A:", ":B", "::S" or a single step, with A and B as in parse_step().
 StepRange parse_range(std::string_view text, const io::LogReader& log, bool may_precede = false);
 
-/// Seconds in "1.2", "1.2 s", "300 ms", "20us", "2 min", "1h"; UsageError (with `what` in front) else.
+/// Seconds in "1.2", "1.2 s", "300 ms", "20us", "2 min", "1h"; UsageError (with `what` in front)
+/// else.
 double parse_seconds(std::string_view text, std::string_view what);
 
 }  // namespace varve::tools

@@ -78,12 +78,13 @@ std::string help_text(const std::string& folder) {
   const std::vector<std::string> built = built_verbs(folder);
   std::string text =
       "usage: varve VERB [options] ...\n\n"
-      "Simulates settling grains in a fluid and records every step, so that a run can be replayed,\n"
-      "forked from any step and compared bit for bit.\n";
+      "Simulates settling grains in a fluid and records every step, so that a run can be\n"
+      "replayed, forked from any step and compared bit for bit.\n";
   for (const Group& group : groups()) {
     std::string lines;
     for (const KnownVerb& verb : group.verbs)
-      if (contains(built, verb.name)) lines += fmt::format("  {:<10} {}\n", verb.name, verb.summary);
+      if (contains(built, verb.name))
+        lines += fmt::format("  {:<10} {}\n", verb.name, verb.summary);
     if (!lines.empty()) text += fmt::format("\n{}\n{}", group.title, lines);
   }
   text +=
