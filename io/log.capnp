@@ -121,13 +121,18 @@ struct Event {
   items @1 :List(Pair);
 }
 
+struct Skip {
+  offset @0 :UInt64;
+  lastStep @1 :UInt64;     # last step that the index record there covers
+}
+
 struct Index {
   ordinal @0 :UInt64;      # 0, 1, 2 ... within the log
   firstStep @1 :UInt64;
   firstOffset @2 :UInt64;  # of the record of firstStep
   gaps @3 :List(UInt32);   # per further step: distance from the record before, in units of 8 bytes
   states @4 :Data;         # per step: 0 digest only, 1 delta, 2 keyframe
-  skips @5 :List(UInt64);  # offsets of earlier index records (io/FORMAT.md, "Index")
+  skips @5 :List(Skip);    # earlier index records (io/FORMAT.md, "Index")
   events @6 :List(UInt64); # offsets of the event records since the index record before
   eventsBefore @7 :UInt64; # offset of the last earlier index record that names events; 0: none
 }

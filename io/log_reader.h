@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "io/genesis.h"
+#include "io/limits.h"
 
 namespace varve::io {
 
@@ -35,7 +36,8 @@ struct StepHeader {
 struct Damage {
   std::int64_t offset = 0;
   std::string what;           ///< record kind and what did not hold
-  std::uint64_t step_from = 0, step_to = 0;  ///< steps that cannot be read because of it
+  /// Steps that cannot be read because of it, inclusive; none where step_from > step_to.
+  std::uint64_t step_from = 1, step_to = 0;
 };
 
 /// Bytes by record kind and by field, for `info`.
@@ -44,16 +46,21 @@ struct ByteCount {
   std::uint64_t records = 0, stored = 0, raw = 0;
 };
 
+/// Not for use by several threads at once: each opens its own.
 class LogReader {
  public:
-  /// Throws LogError (not_found, not_a_log, unsupported, damaged where genesis itself is).
-  static std::unique_ptr<LogReader> open(const std::string& path, FileSystem* files = nullptr);
+  /// Throws LogError (not_found, not_a_log, unsupported, limit, damaged where genesis itself is or
+  /// no step is whole).
+  static std::unique_ptr<LogReader> open(const std::string& path, FileSystem* files = nullptr,
+                                         const Limits& limits = {});
   virtual ~LogReader() = default;
 
   virtual const std::string& path() const = 0;
   virtual const Genesis& genesis() const = 0;
   virtual std::uint64_t first_step() const = 0;
   virtual std::uint64_t last_step() const = 0;
+  /// As far as is known: opening looks at the end, reading at what it reads, verify() at all. A
+  /// part of a record behind the end of a log that is just being written is not called torn.
   virtual Completeness completeness() const = 0;
   virtual bool closed() const = 0;
   /// Bytes beyond the last whole record (torn), else 0.
@@ -63,7 +70,7 @@ class LogReader {
   virtual std::optional<StepHeader> header(std::uint64_t step) const = 0;
   /// Nearest step <= `step` whose state is stored, from which re-execution can start.
   virtual std::optional<std::uint64_t> stored_step_at_or_before(std::uint64_t step) const = 0;
-  /// The state of a step. Nothing where its state is not stored (tier digests, every k) or lost.
+  /// The state of a step, tables included. Nothing where its state is not stored (tier digests, every k) or lost.
   /// Throws LogError(damaged) where the decoded state's digest is not the recorded one.
   virtual std::optional<Frame> frame(std::uint64_t step) const = 0;
   /// Tables recorded at a step (empty tables where none were).
@@ -72,6 +79,9 @@ class LogReader {
   /// (`frame` is null where no state is stored). Stops when `visit` returns false.
   virtual void for_each(std::uint64_t from, std::uint64_t to,
                         const std::function<bool(const StepHeader&, const Frame*)>& visit) const = 0;
+  /// The same without decoding any state.
+  virtual void for_each_header(std::uint64_t from, std::uint64_t to,
+                               const std::function<bool(const StepHeader&)>& visit) const = 0;
   /// Events in order of step, all of them (they are few).
   virtual std::vector<Event> events() const = 0;
   /// Last step whose time is <= `time` + 1e-6 dt; first step where `time` lies before it.
@@ -86,7 +96,8 @@ class LogReader {
     std::uint64_t bytes_checked = 0, file_bytes = 0, steps = 0;
     std::vector<Damage> damage;
   };
-  virtual Verification verify() const = 0;
+  /// `decode`: also every state, against its digest.
+  virtual Verification verify(bool decode = true) const = 0;
   virtual std::vector<ByteCount> bytes_by_kind() const = 0;
   virtual std::vector<ByteCount> bytes_by_field() const = 0;
   /// Records and index entries read since opening.

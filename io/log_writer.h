@@ -14,8 +14,10 @@ namespace varve::io {
 class FileSystem;  // io/file.h: the real one, or one that fails on purpose
 
 struct WriterOptions {
-  std::uint32_t queue_slots = 16;   ///< frames in flight before append() waits
-  double sync_seconds = 2.0;        ///< at most this long between syncs (and at every keyframe)
+  std::uint32_t queue_slots = 16;   ///< at most so many frames in flight before append() waits
+  std::uint64_t queue_bytes = std::uint64_t{32} << 20;  ///< fewer (at least 3) where they exceed it
+  double sync_seconds = 2.0;        ///< at most this long between syncs, and at every keyframe ...
+  double keyframe_sync_apart_seconds = 0.1;  ///< ... unless the last sync is more recent than this
   bool overwrite = false;           ///< create(): replace an existing file
   FileSystem* files = nullptr;      ///< nullptr: the operating system's
 };

@@ -1,0 +1,201 @@
+// Decoding states, tables and events; counting bytes.
+#include <algorithm>
+#include <map>
+
+#include "io/errors.h"
+#include "io/log_reader_impl.h"
+#include "io/schema_check.h"
+
+namespace varve::io {
+
+bool LogReaderImpl::decode_to(const StepEntry& keyframe, std::uint64_t step) const {
+  if (decoded_step_ == step) return true;
+  std::uint64_t offset = keyframe.offset;
+  std::uint64_t sequence = RecordWalk::any_sequence;
+  if (decoded_step_ && *decoded_step_ >= keyframe.step && *decoded_step_ < step) {
+    offset = decoded_end_;
+    sequence = decoded_sequence_;
+  }
+  RecordWalk walk(source_, offset, sequence, end_, Check::message);
+  std::optional<std::uint64_t> before;
+  for (auto item = walk.next(); item != RecordWalk::Item::end; item = walk.next()) {
+    if (item == RecordWalk::Item::bad) {
+      completeness_ = Completeness::damaged;
+      continue;
+    }
+    const Record& record = walk.record();
+    if (!is_step(record.header.kind)) continue;
+    // A missing step breaks the chain of deltas; damage that took no step does not.
+    if (record.header.step > step || (before && record.header.step != *before + 1)) return false;
+    before = record.header.step;
+    const StepMessage message = step_message(record);
+    if (message.fields.empty()) continue;
+    decoded_step_.reset();  // stays so where reading throws
+    if (!decoder_.read(record, message)) return false;
+    decoded_step_ = record.header.step;
+    decoded_end_ = walk.offset();
+    decoded_sequence_ = walk.sequence();
+    if (record.header.step == step) return true;
+  }
+  return false;
+}
+
+std::optional<Frame> LogReaderImpl::frame(std::uint64_t step) const {
+  for (;;) {
+    const bool scanned = scan_.has_value();
+    const auto found = entry(step);
+    if (!found || found->state == StoredState::none) return std::nullopt;
+    const auto keyframe = keyframe_at_or_before(step);
+    if (!keyframe) return std::nullopt;
+    if (decode_to(*keyframe, step)) return decoder_.frame();
+    found_damage();
+    if (scanned) return std::nullopt;
+  }
+}
+
+std::optional<Frame> LogReaderImpl::tables(std::uint64_t step) const {
+  FrameReader reader(source_, genesis_.genesis.schema, genesis_.particles_max);
+  Record record;
+  StepMessage message;
+  for (int attempt = 0; attempt < 2; ++attempt) {
+    const auto found = entry(step);
+    if (!found) return std::nullopt;
+    if (read_step(*found, record, message) && reader.read_tables(record, message)) {
+      return reader.frame();
+    }
+    found_damage();
+  }
+  return std::nullopt;
+}
+
+// Where a walk must begin so that every state from `from` on can be decoded, if any can.
+std::uint64_t LogReaderImpl::start_of_walk(std::uint64_t from, bool decode) const {
+  if (from <= first_.step) return genesis_end_;
+  if (decode) {
+    if (const auto keyframe = keyframe_at_or_before(from)) return keyframe->offset;
+  }
+  const auto found = entry(held_at_or_before(from));
+  return found ? found->offset : genesis_end_;
+}
+
+void LogReaderImpl::walk_steps(
+    std::uint64_t from, std::uint64_t to, bool decode,
+    const std::function<bool(const StepHeader&, const Frame*)>& visit) const {
+  if (to < from || from > last_.step) return;
+  FrameReader reader(source_, genesis_.genesis.schema, genesis_.particles_max);
+  RecordWalk walk(source_, start_of_walk(from, decode), RecordWalk::any_sequence, end_,
+                  Check::message);
+  DeltaChain chain;
+  for (auto item = walk.next(); item != RecordWalk::Item::end; item = walk.next()) {
+    if (item == RecordWalk::Item::bad) {
+      completeness_ = Completeness::damaged;
+      continue;
+    }
+    const Record& record = walk.record();
+    if (!is_step(record.header.kind)) continue;
+    if (record.header.step > to) return;
+    const StepMessage message = step_message(record);
+    const StepHeader header = header_of(record, message);
+    const bool decodable = chain.add(record.header) && header.has_state;
+    const bool decoded = decode && decodable && reader.read(record, message);
+    if (decode && decodable && !decoded) {
+      completeness_ = Completeness::damaged;
+      chain.interrupt();
+    }
+    if (header.step < from) continue;
+    if (!visit(header, decoded ? &reader.frame() : nullptr)) return;
+  }
+}
+
+void LogReaderImpl::for_each(
+    std::uint64_t from, std::uint64_t to,
+    const std::function<bool(const StepHeader&, const Frame*)>& visit) const {
+  walk_steps(from, to, true, visit);
+}
+
+void LogReaderImpl::for_each_header(std::uint64_t from, std::uint64_t to,
+                                    const std::function<bool(const StepHeader&)>& visit) const {
+  walk_steps(from, to, false,
+             [&visit](const StepHeader& header, const Frame*) { return visit(header); });
+}
+
+std::vector<Event> LogReaderImpl::events() const {
+  std::vector<Event> out;
+  Record record;
+  for (int attempt = 0; attempt < 2; ++attempt) {
+    const std::vector<std::uint64_t> offsets = event_offsets();
+    out.clear();
+    const bool whole = std::all_of(offsets.begin(), offsets.end(), [&](std::uint64_t offset) {
+      if (!source_.read(offset, file_end_, Check::message, record)) return false;
+      if (record.header.kind != RecordKind::event) return false;
+      out.push_back(decode_event(record.message, record.header.step, source_.limits()));
+      return true;
+    });
+    if (whole) break;
+    found_damage();
+  }
+  return out;
+}
+
+std::vector<ByteCount> LogReaderImpl::bytes_by_kind() const {
+  std::map<std::string, ByteCount> counts;
+  RecordWalk walk(source_, 0, 0, end_, Check::message);
+  for (auto item = walk.next(); item != RecordWalk::Item::end; item = walk.next()) {
+    if (item == RecordWalk::Item::bad) continue;
+    const RecordHeader& header = walk.record().header;
+    ByteCount& count = counts[name_of(header.kind)];
+    count.name = name_of(header.kind);
+    ++count.records;
+    count.stored += header.record_bytes();
+    count.raw += header_bytes + header.message_raw;
+    if (!is_step(header.kind)) continue;
+    const StepMessage message = step_message(walk.record());
+    const Schema& schema = genesis_.genesis.schema;
+    for (std::size_t i = 0; i < std::min(message.fields.size(), schema.fields.size()); ++i) {
+      if (message.fields[i].stored == 0 && schema.fields[i].constant) continue;
+      count.raw += message.fields[i].count * schema.fields[i].bytes_per_particle();
+    }
+    for (std::size_t i = 0; i < std::min(message.tables.size(), schema.tables.size()); ++i) {
+      count.raw += message.tables[i].rows * row_bytes(schema.tables[i]);
+    }
+  }
+  std::vector<ByteCount> out;
+  for (auto& [name, count] : counts) out.push_back(std::move(count));
+  return out;
+}
+
+std::vector<ByteCount> LogReaderImpl::bytes_by_field() const {
+  const Schema& schema = genesis_.genesis.schema;
+  std::vector<ByteCount> fields(schema.fields.size());
+  std::vector<ByteCount> tables(schema.tables.size());
+  for (std::size_t i = 0; i < fields.size(); ++i) fields[i].name = schema.fields[i].name;
+  for (std::size_t i = 0; i < tables.size(); ++i) tables[i].name = schema.tables[i].name;
+  RecordWalk walk(source_, genesis_end_, 1, end_, Check::message);
+  for (auto item = walk.next(); item != RecordWalk::Item::end; item = walk.next()) {
+    if (item == RecordWalk::Item::bad || !is_step(walk.record().header.kind)) continue;
+    const StepMessage message = step_message(walk.record());
+    for (std::size_t i = 0; i < std::min(message.fields.size(), fields.size()); ++i) {
+      const FieldBlob& blob = message.fields[i];
+      if (blob.stored == 0 && schema.fields[i].constant) continue;
+      ++fields[i].records;
+      fields[i].stored += blob.stored;
+      fields[i].raw += blob.count * schema.fields[i].bytes_per_particle();
+    }
+    for (std::size_t i = 0; i < std::min(message.tables.size(), tables.size()); ++i) {
+      const TableBlob& blob = message.tables[i];
+      if (blob.rows == 0) continue;
+      ++tables[i].records;
+      tables[i].stored += blob.stored;
+      tables[i].raw += blob.rows * row_bytes(schema.tables[i]);
+    }
+  }
+  fields.insert(fields.end(), std::make_move_iterator(tables.begin()),
+                std::make_move_iterator(tables.end()));
+  return fields;
+}
+
+LogReader::Verification LogReaderImpl::verify(bool decode) const {
+  return verify_log(*file_, source_.limits(), decode);
+}
+
+}  // namespace varve::io

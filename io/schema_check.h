@@ -1,0 +1,31 @@
+// Rules that a schema, a genesis and a frame must keep, checked where they enter and where they are
+// read back.
+#pragma once
+
+#include <string>
+
+#include "io/errors.h"
+#include "io/genesis.h"
+#include "io/limits.h"
+
+namespace varve::io {
+
+/// Throws LogError(`kind`, `path`) naming the first rule that does not hold. `kind` is mismatch for
+/// what an engine hands over and damaged for what a log says.
+void check_schema(const Schema& schema, ErrorKind kind, const std::string& path,
+                  const Limits& limits);
+void check_genesis(const Genesis& genesis, ErrorKind kind, const std::string& path,
+                   const Limits& limits);
+
+/// Throws LogError(mismatch) where `frame` does not fit `schema`: number of fields and tables,
+/// counts per population, byte lengths. No tables at all stands for tables without rows.
+void check_frame(const Schema& schema, const FrameView& frame, const std::string& path,
+                 std::uint64_t particles_max, const Limits& limits);
+
+/// Throws LogError(mismatch) where the ids of a population do not ascend.
+void check_ids(const Schema& schema, const FrameView& frame, const std::string& path);
+
+/// Bytes of one row of a table.
+std::size_t row_bytes(const TableDescriptor& table);
+
+}  // namespace varve::io

@@ -1,0 +1,100 @@
+#include "io/step_encoder.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "io/bytes.h"
+#include "io/packing.h"
+#include "io/schema_check.h"
+
+namespace varve::io {
+
+Digest chain_before_first(const Genesis& genesis) {
+  return genesis.lineage ? genesis.lineage->chain_base : chain_base(genesis.schema);
+}
+
+StepEncoder::StepEncoder(const Genesis& genesis, std::string path, const Limits& limits,
+                         std::optional<Digest> chain)
+    : schema_(genesis.schema),
+      path_(std::move(path)),
+      limits_(limits),
+      tier_(genesis.tier),
+      every_(genesis.every),
+      keyframe_steps_(genesis.keyframe_steps),
+      chain_(chain ? *chain : chain_before_first(genesis)),
+      encoder_(FrameEncoder::create(genesis.schema)) {}
+
+StepEncoder::Store StepEncoder::choose(const FrameView& frame) {
+  const bool counts_changed =
+      !std::equal(frame.fields.begin(), frame.fields.end(), counts_.begin(), counts_.end(),
+                  [](const FieldView& field, std::uint64_t count) { return field.count == count; });
+  if (!started_ || counts_changed) return Store::keyframe;
+  const bool due = frame.step - last_keyframe_ >= keyframe_steps_;
+  if (tier_ == Tier::digests) return due ? Store::keyframe : Store::nothing;
+  if (frame.step % every_ != 0) return Store::nothing;
+  return due ? Store::keyframe : Store::delta;
+}
+
+void StepEncoder::store_fields(const FrameView& frame, bool& keyframe) {
+  fields_ = encoder_->encode(frame, keyframe);
+  for (const EncodedField& field : fields_) {
+    FieldBlob& blob = message_.fields.emplace_back();
+    blob.checksum = checksum(field.payload);
+    blob.count = static_cast<std::uint32_t>(field.count);
+    blob.stored = static_cast<std::uint32_t>(field.payload.size());
+    blob.method = field.method;
+    blob.order = field.order;
+    blobs_.emplace_back(field.payload);
+  }
+}
+
+void StepEncoder::store_tables(const FrameView& frame) {
+  const bool any = std::any_of(frame.tables.begin(), frame.tables.end(),
+                               [](const TableView& table) { return table.rows > 0; });
+  if (!any) return;
+  tables_.resize(frame.tables.size());
+  Bytes plain;
+  for (std::size_t i = 0; i < frame.tables.size(); ++i) {
+    const TableView& table = frame.tables[i];
+    plain.resize(table.rows * row_bytes(schema_.tables[i]));
+    std::byte* at = plain.data();
+    for (std::size_t c = 0; c < table.columns.size(); ++c) {
+      copy_le(at, table.columns[c], size_of(schema_.tables[i].columns[c].type));
+      at += table.columns[c].size();
+    }
+    TableBlob& blob = message_.tables.emplace_back();
+    blob.packing = pack(plain, tables_[i], limits_);
+    blob.checksum = checksum(tables_[i]);
+    blob.rows = static_cast<std::uint32_t>(table.rows);
+    blob.stored = static_cast<std::uint32_t>(tables_[i].size());
+    blobs_.emplace_back(tables_[i]);
+  }
+}
+
+bool StepEncoder::add(const FrameView& frame, LogAppender& log) {
+  message_ = {};
+  blobs_.clear();
+  message_.time = frame.time;
+  message_.dt = frame.dt;
+  message_.digest = digest_frame(schema_, frame);
+  message_.chain = chain_next(chain_, message_.digest);
+  const Store store = choose(frame);
+  bool keyframe = store == Store::keyframe;
+  if (store != Store::nothing) store_fields(frame, keyframe);
+  if (keyframe) {
+    check_ids(schema_, frame, path_);
+    last_keyframe_ = frame.step;
+    started_ = true;
+  }
+  // In the digests tier a step between keyframes is its digest: tables follow by re-execution.
+  if (tier_ != Tier::digests) store_tables(frame);
+  if (store != Store::nothing) {
+    counts_.clear();
+    for (const FieldView& field : frame.fields) counts_.push_back(field.count);
+  }
+  log.step(frame.step, keyframe, message_, blobs_);
+  chain_ = message_.chain;
+  return keyframe;
+}
+
+}  // namespace varve::io
