@@ -33,7 +33,7 @@ void bounds(std::span<const Vec<Position, D>> points, int axis, double& low, dou
 template <int D, class Position>
 void CellGrid<D, Position>::build(std::span<const Vec<Position, D>> points, double cell,
                                   const Periodicity<D>& period) {
-  double low[D] = {}, high[D] = {}, cells[D] = {}, total_cells = 1;
+  double low[D] = {}, high[D] = {}, cells[D] = {};
   for (int a = 0; a < D; ++a) {
     periodic_[a] = period.length[a] > 0;
     if (periodic_[a]) {
@@ -42,18 +42,21 @@ void CellGrid<D, Position>::build(std::span<const Vec<Position, D>> points, doub
     } else {
       bounds(points, a, low[a], high[a]);
     }
-    cells[a] = std::max(1.0, std::floor((high[a] - low[a]) / cell));
-    total_cells *= cells[a];
+    cells[a] = std::clamp(std::floor((high[a] - low[a]) / cell), 1.0, 1e9);
   }
   // Points that have run away must not cost memory: no more cells than a few per point.
   const double most = 4 * static_cast<double>(points.size()) + 4096;
-  while (total_cells > most) {
+  // Multiplied afresh every time: a product beyond 2^53 is rounded and could not be divided back.
+  const auto number = [&cells] {
+    double product = 1;
+    for (const double each : cells) product *= each;
+    return product;
+  };
+  while (number() > most) {
     double* const longest = std::max_element(cells, cells + D);
-    total_cells /= *longest;
     *longest = std::max(1.0, std::floor(0.5 * *longest));
-    total_cells *= *longest;
   }
-  const auto total = static_cast<std::size_t>(total_cells);
+  const auto total = static_cast<std::size_t>(number());
   for (int a = 0; a < D; ++a) {
     size_[a] = static_cast<std::int64_t>(cells[a]);
     origin_[a] = low[a];
