@@ -27,7 +27,8 @@ struct FieldDescriptor {
   ScalarType type = ScalarType::f64;
   std::uint32_t components = 1;
   std::string unit;       ///< SI, e.g. "m/s"; empty for pure numbers
-  bool is_id = false;     ///< the ascending ids of its population (at most one field each)
+  bool is_id = false;     ///< ascending u64 keys of its population (one field each; one or more
+                          ///< components, the first leading)
   bool constant = false;  ///< changes only where the count does: in keyframes, not in deltas
   /// Hint: name of a field v such that this[n+1] = this[n] + dt[n+1] * v[n+1], evaluated in the
   /// field's own scalar type as one multiplication and one addition. A wrong hint costs bytes,

@@ -5,6 +5,7 @@
 #include <cstring>
 #include <set>
 
+#include "io/codec_identity.h"
 #include "io/framing.h"
 
 namespace varve::io {
@@ -52,8 +53,7 @@ void check_field(const Rules& rules, const Schema& schema, const FieldDescriptor
                                                static_cast<int>(field.type)));
   rules.require(field.components > 0, what + ": no components");
   rules.at_most(field.components, rules.limits.components_max, "components_max", what);
-  rules.require(!field.is_id || (field.type == ScalarType::u64 && field.components == 1),
-                what + ": ids must be one u64 each");
+  rules.require(!field.is_id || codec::is_identity(field), what + ": ids must be whole numbers");
   if (field.follows.empty()) return;
   const int at = schema.find(field.follows);
   rules.require(at >= 0, fmt::format("{}: follows '{}', which is no field", what, field.follows));
@@ -213,17 +213,11 @@ void check_frame(const Schema& schema, const FrameView& frame, const std::string
 void check_ids(const Schema& schema, const FrameView& frame, const std::string& path) {
   for (std::size_t i = 0; i < schema.fields.size(); ++i) {
     if (!schema.fields[i].is_id) continue;
-    const auto bytes = frame.fields[i].bytes;
-    std::uint64_t before = 0;
-    for (std::size_t at = 0; at + 8 <= bytes.size(); at += 8) {
-      std::uint64_t id = 0;
-      std::memcpy(&id, bytes.data() + at, 8);
-      if (at > 0 && id <= before) {
-        throw LogError(ErrorKind::mismatch, path,
-                       fmt::format("step {}: ids of '{}' do not ascend: {} after {}", frame.step,
-                                   schema.fields[i].name, id, before));
-      }
-      before = id;
+    const FieldView& ids = frame.fields[i];
+    if (!codec::ascending(schema.fields[i], ids.bytes, ids.count)) {
+      throw LogError(ErrorKind::mismatch, path,
+                     fmt::format("step {}: ids of '{}' do not ascend", frame.step,
+                                 schema.fields[i].name));
     }
   }
 }
