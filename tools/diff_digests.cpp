@@ -112,6 +112,8 @@ void search(const Side& a, const Side& b, const std::vector<std::uint64_t>& step
       });
   if (a.log != nullptr) report.header_reads_a = a.log->header_reads();
   if (b.log != nullptr) report.header_reads_b = b.log->header_reads();
+  if (a.log != nullptr) require_whole(*a.log);
+  if (b.log != nullptr) require_whole(*b.log);
   report.from = steps.front();
   report.to = steps.back();
   report.steps_compared = steps.size();

@@ -221,11 +221,15 @@ class LogComparison {
 
 }  // namespace
 
+void require_whole(const io::LogReader& log) {
+  if (log.completeness() == io::Completeness::damaged)
+    throw io::LogError(io::ErrorKind::damaged, log.path(),
+                       "damaged; 'varve verify' says where, 'varve recover' saves what is whole");
+}
+
 std::unique_ptr<io::LogReader> open_whole(const std::string& path) {
   auto log = io::LogReader::open(path);
-  if (log->completeness() == io::Completeness::damaged)
-    throw io::LogError(io::ErrorKind::damaged, path,
-                       "damaged; 'varve verify' says where, 'varve recover' saves what is whole");
+  require_whole(*log);
   if (log->completeness() == io::Completeness::torn)
     warn(fmt::format("{}: torn: {} bytes beyond step {} are left out", path, log->torn_bytes(),
                      log->last_step()));
@@ -234,7 +238,11 @@ std::unique_ptr<io::LogReader> open_whole(const std::string& path) {
 
 DiffReport compare_logs(const io::LogReader& a, const io::LogReader& b,
                         const DiffOptions& options) {
-  return LogComparison(a, b, options).run();
+  DiffReport report = LogComparison(a, b, options).run();
+  // Rot is only noticed where it is read; what was found beside it is not to be relied on.
+  require_whole(a);
+  require_whole(b);
+  return report;
 }
 
 }  // namespace varve::tools

@@ -1,6 +1,7 @@
 // Comparing two inputs, each a run or a digest file, from opening them to the report.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -30,6 +31,9 @@ DiffReport compare_logs(const io::LogReader& a, const io::LogReader& b, const Di
 /// Compares a run with a digest file; the report's a is the run.
 DiffReport compare_with_digests(const io::LogReader& run, const DigestFile& file,
                                 const DiffOptions& options);
+
+/// Throws LogError(damaged) if damage is known of.
+void require_whole(const io::LogReader& log);
 
 /// Opens a log for comparison; a damaged one is an error, a torn one a warning.
 std::unique_ptr<io::LogReader> open_whole(const std::string& path);

@@ -146,17 +146,19 @@ std::vector<GrowthSample> sample_growth(const StatePair& pair, std::uint64_t fir
 Reconvergence find_reconvergence(const io::LogReader& a, const io::LogReader& b,
                                  std::uint64_t first, std::uint64_t last) {
   Reconvergence out;
-  for (std::uint64_t step = first + 1; step <= last && step != 0; ++step) {
-    const auto x = a.header(step), y = b.header(step);
-    if (!x || !y) continue;
-    if (x->digest != y->digest) {
+  if (first == last) return out;
+  a.for_each_header(first + 1, last, [&](const io::StepHeader& x) {
+    const auto y = b.header(x.step);
+    if (!y) return true;
+    if (x.digest != y->digest) {
       out.equal_to_the_end.reset();
-      continue;
+      return true;
     }
     ++out.equal_steps;
-    if (!out.first_equal) out.first_equal = step;
-    if (!out.equal_to_the_end) out.equal_to_the_end = step;
-  }
+    if (!out.first_equal) out.first_equal = x.step;
+    if (!out.equal_to_the_end) out.equal_to_the_end = x.step;
+    return true;
+  });
   return out;
 }
 

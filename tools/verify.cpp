@@ -17,7 +17,7 @@ std::string damage_text(const io::Damage& damage) {
   std::string out = fmt::format("offset {}: {}", damage.offset, damage.what);
   if (damage.step_to > damage.step_from)
     out += fmt::format("; steps {} to {} can't be read", damage.step_from, damage.step_to);
-  else
+  else if (damage.step_to == damage.step_from)
     out += fmt::format("; step {} can't be read", damage.step_from);
   return out;
 }
@@ -51,7 +51,7 @@ std::string json_text(const std::string& path, const Verification& found) {
 Verification unreadable(const io::LogError& error) {
   Verification out;
   out.completeness = io::Completeness::damaged;
-  out.damage.push_back({error.offset() < 0 ? 0 : error.offset(), error.what(), 0, 0});
+  out.damage.push_back({error.offset() < 0 ? 0 : error.offset(), error.what()});
   return out;
 }
 
