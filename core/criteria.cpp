@@ -39,19 +39,17 @@ bool grains_move(const Scenario& scenario) {
   return scenario.has_grains() && scenario.grains.motion == GrainMotion::free;
 }
 
-/// What a body force can do to the fluid: no more than a free fall over the domain's longer side,
-/// and no more than the middle of a plane channel where viscosity holds it.
+/// What a body force does to the fluid: where it drives it round through periodic sides, the speed in
+/// the middle of a plane channel with the walls beside it; else a free fall along the domain.
 double body_force_speed(const Scenario& s) {
   const double force = length_of(s.fluid.body_force_x, s.fluid.body_force_y);
-  if (force == 0) return 0;
-  const double fall = std::sqrt(2 * force * std::max(s.domain.width, s.domain.height));
   const bool along_x = std::abs(s.fluid.body_force_x) >= std::abs(s.fluid.body_force_y);
-  const bool held = along_x ? s.domain.bottom != Boundary::periodic
-                            : s.domain.sides != Boundary::periodic;
-  if (!held) return fall;
+  const Boundary ends = along_x ? s.domain.sides : s.domain.bottom;
+  const Boundary beside = along_x ? s.domain.bottom : s.domain.sides;
   const double gap = along_x ? s.domain.height : s.domain.width;
-  const double channel = force * gap * gap * s.fluid.density / (8 * s.fluid.viscosity);
-  return std::min(fall, channel);
+  if (ends == Boundary::periodic && beside != Boundary::periodic)
+    return force * gap * gap * s.fluid.density / (8 * s.fluid.viscosity);
+  return std::sqrt(2 * force * (along_x ? s.domain.width : s.domain.height));
 }
 
 }  // namespace

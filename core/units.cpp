@@ -78,8 +78,9 @@ bool read_unit(std::string_view text, Quantity& quantity, int& tens, double& fac
     if (!unit || ++atoms > 6) return false;
     text.remove_prefix(n);
     int power = 1;
-    if (!text.empty() && text.front() == '^') text.remove_prefix(1);
-    if (!text.empty() && (is_digit(text.front()) || text.front() == '-')) {
+    const bool raised = !text.empty() && text.front() == '^';
+    if (raised) text.remove_prefix(1);
+    if (raised || (!text.empty() && (is_digit(text.front()) || text.front() == '-'))) {
       const auto read = std::from_chars(text.data(), text.data() + text.size(), power);
       if (read.ec != std::errc{} || power < -power_max || power > power_max || power == 0)
         return false;
@@ -152,6 +153,16 @@ double read_back(const std::string& text) {
   return value;
 }
 
+/// One unit of the sixth significant digit.
+double last_digit(double value) {
+  std::array<char, 40> buffer;
+  const auto written = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value,
+                                     std::chars_format::scientific, 5);
+  const std::string text(buffer.data(), written.ptr);
+  const std::size_t mark = text.find('e');
+  return mark == std::string::npos ? 0.0 : read_back("1" + text.substr(mark)) / 1e5;
+}
+
 }  // namespace
 
 std::variant<Quantity, QuantityError> read_quantity(std::string_view text) {
@@ -191,14 +202,14 @@ std::string rough_number(double value) { return six_digits(value); }
 
 std::string number_below(double value) {
   const std::string nearest = six_digits(value);
-  if (read_back(nearest) <= value) return nearest;
-  return six_digits(value - 1e-5 * std::abs(value));
+  const double read = read_back(nearest);
+  return read <= value ? nearest : six_digits(read - last_digit(value));
 }
 
 std::string number_above(double value) {
   const std::string nearest = six_digits(value);
-  if (read_back(nearest) >= value) return nearest;
-  return six_digits(value + 1e-5 * std::abs(value));
+  const double read = read_back(nearest);
+  return read >= value ? nearest : six_digits(read + last_digit(value));
 }
 
 namespace {
