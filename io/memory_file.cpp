@@ -15,6 +15,15 @@ namespace {
 struct Node {
   std::vector<std::byte> bytes;
   std::vector<std::byte> durable;
+  std::size_t changed_from = 0;  // up to here both are equal
+
+  void sync() {
+    changed_from = std::min({changed_from, bytes.size(), durable.size()});
+    durable.resize(changed_from);
+    durable.insert(durable.end(), bytes.begin() + static_cast<std::ptrdiff_t>(changed_from),
+                   bytes.end());
+    changed_from = bytes.size();
+  }
 };
 
 using Names = std::map<std::string, std::shared_ptr<Node>>;
@@ -84,6 +93,7 @@ class MemoryFileSystem::MemoryFile final : public File {
     std::size_t put = bytes.size();
     if (hit == FaultKind::short_write) put /= 2;
     if (hit == FaultKind::no_space || hit == FaultKind::io_error) put = 0;
+    node_->changed_from = std::min<std::size_t>(node_->changed_from, offset);
     if (node_->bytes.size() < offset + put) node_->bytes.resize(offset + put);
     std::copy_n(bytes.begin(), put, node_->bytes.begin() + static_cast<std::ptrdiff_t>(offset));
     if (hit != FaultKind::none) {
@@ -94,12 +104,13 @@ class MemoryFileSystem::MemoryFile final : public File {
   void sync() override {
     const std::lock_guard guard(shared_->mutex);
     shared_->check(true, path_, "syncing");
-    node_->durable = node_->bytes;
+    node_->sync();
   }
 
   void truncate(std::uint64_t size) override {
     const std::lock_guard guard(shared_->mutex);
     shared_->check(false, path_, fmt::format("cutting to {} bytes", size));
+    node_->changed_from = std::min<std::size_t>(node_->changed_from, size);
     node_->bytes.resize(size);
   }
 
@@ -214,6 +225,7 @@ void MemoryFileSystem::lose_power(std::uint64_t unsynced_bytes) {
     bytes.resize(std::max(synced, std::min<std::size_t>(bytes.size(), synced + unsynced_bytes)));
     std::copy(node->durable.begin(), node->durable.end(), bytes.begin());
     node->durable = bytes;
+    node->changed_from = bytes.size();
   }
 }
 

@@ -22,7 +22,8 @@ void check_genesis(const Genesis& genesis, ErrorKind kind, const std::string& pa
 void check_frame(const Schema& schema, const FrameView& frame, const std::string& path,
                  std::uint64_t particles_max, const Limits& limits);
 
-/// Throws LogError(mismatch) where the ids of a population do not ascend.
+/// Throws LogError(mismatch) where the ids of a population do not ascend; ids of several components
+/// are compared from the first on.
 void check_ids(const Schema& schema, const FrameView& frame, const std::string& path);
 
 /// Bytes of one row of a table.

@@ -24,18 +24,34 @@ StepEncoder::StepEncoder(const Genesis& genesis, std::string path, const Limits&
       chain_(chain ? *chain : chain_before_first(genesis)),
       encoder_(FrameEncoder::create(genesis.schema)) {}
 
-StepEncoder::Store StepEncoder::choose(const FrameView& frame) {
-  const bool counts_changed =
-      !std::equal(frame.fields.begin(), frame.fields.end(), counts_.begin(), counts_.end(),
-                  [](const FieldView& field, std::uint64_t count) { return field.count == count; });
-  if (!started_ || counts_changed) return Store::keyframe;
+// Particles that came or went make a keyframe. What comes and goes all the time (a population
+// without constant fields, such as contacts) does not: the codec matches it by its ids.
+bool StepEncoder::particles_changed(const FrameView& frame) const {
+  for (std::size_t i = 0; i < schema_.fields.size(); ++i)
+    if (schema_.fields[i].constant && frame.fields[i].count != counts_[i]) return true;
+  return false;
+}
+
+// A constant field is only in keyframes, so a change of its count makes one. Populations without
+// such fields (contacts, say) come and go within deltas.
+bool StepEncoder::constants_changed(const FrameView& frame) const {
+  for (std::size_t i = 0; i < schema_.fields.size(); ++i) {
+    if (schema_.fields[i].constant && frame.fields[i].count != counts_[i]) return true;
+  }
+  return false;
+}
+
+StepEncoder::Store StepEncoder::choose(const FrameView& frame) const {
+  if (counts_.empty() || constants_changed(frame)) return Store::keyframe;
   const bool due = frame.step - last_keyframe_ >= keyframe_steps_;
   if (tier_ == Tier::digests) return due ? Store::keyframe : Store::nothing;
   if (frame.step % every_ != 0) return Store::nothing;
   return due ? Store::keyframe : Store::delta;
 }
 
-void StepEncoder::store_fields(const FrameView& frame, bool& keyframe) {
+// Returns whether the record can be decoded without any before it.
+bool StepEncoder::store_fields(const FrameView& frame) {
+  bool keyframe = false;
   fields_ = encoder_->encode(frame, keyframe);
   for (const EncodedField& field : fields_) {
     FieldBlob& blob = message_.fields.emplace_back();
@@ -46,6 +62,9 @@ void StepEncoder::store_fields(const FrameView& frame, bool& keyframe) {
     blob.order = field.order;
     blobs_.emplace_back(field.payload);
   }
+  counts_.clear();
+  for (const FieldView& field : frame.fields) counts_.push_back(field.count);
+  return keyframe;
 }
 
 void StepEncoder::store_tables(const FrameView& frame) {
@@ -79,19 +98,14 @@ bool StepEncoder::add(const FrameView& frame, LogAppender& log) {
   message_.digest = digest_frame(schema_, frame);
   message_.chain = chain_next(chain_, message_.digest);
   const Store store = choose(frame);
-  bool keyframe = store == Store::keyframe;
-  if (store != Store::nothing) store_fields(frame, keyframe);
+  if (store == Store::keyframe) encoder_->restart();
+  const bool keyframe = store != Store::nothing && store_fields(frame);
   if (keyframe) {
     check_ids(schema_, frame, path_);
     last_keyframe_ = frame.step;
-    started_ = true;
   }
   // In the digests tier a step between keyframes is its digest: tables follow by re-execution.
   if (tier_ != Tier::digests) store_tables(frame);
-  if (store != Store::nothing) {
-    counts_.clear();
-    for (const FieldView& field : frame.fields) counts_.push_back(field.count);
-  }
   log.step(frame.step, keyframe, message_, blobs_);
   chain_ = message_.chain;
   return keyframe;

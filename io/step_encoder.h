@@ -26,8 +26,10 @@ class StepEncoder {
 
  private:
   enum class Store { nothing, delta, keyframe };
-  Store choose(const FrameView& frame);
-  void store_fields(const FrameView& frame, bool& keyframe);
+  bool particles_changed(const FrameView& frame) const;
+  bool constants_changed(const FrameView& frame) const;
+  Store choose(const FrameView& frame) const;
+  bool store_fields(const FrameView& frame);
   void store_tables(const FrameView& frame);
 
   Schema schema_;
@@ -38,9 +40,8 @@ class StepEncoder {
   std::uint32_t keyframe_steps_;
   Digest chain_;
   std::unique_ptr<FrameEncoder> encoder_;
-  bool started_ = false;
   std::uint64_t last_keyframe_ = 0;
-  std::vector<std::uint64_t> counts_;  // at the last state stored
+  std::vector<std::uint64_t> counts_;  // at the last state stored; empty before the first
 
   StepMessage message_;
   std::vector<EncodedField> fields_;
