@@ -39,8 +39,8 @@ bool grains_move(const Scenario& scenario) {
   return scenario.has_grains() && scenario.grains.motion == GrainMotion::free;
 }
 
-/// What a body force does to the fluid: where it drives it round through periodic sides, the speed in
-/// the middle of a plane channel with the walls beside it; else a free fall along the domain.
+/// What a body force does to the fluid: where it drives it round through periodic sides, the speed
+/// in the middle of a plane channel with the walls beside it; else a free fall along the domain.
 double body_force_speed(const Scenario& s) {
   const double force = length_of(s.fluid.body_force_x, s.fluid.body_force_y);
   const bool along_x = std::abs(s.fluid.body_force_x) >= std::abs(s.fluid.body_force_y);

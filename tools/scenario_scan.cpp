@@ -108,7 +108,8 @@ class Scanner {
     const bool closed = name.ends_with(']');
     if (closed) name.remove_suffix(1);
     name = trim(name);
-    if (!closed || name.empty() || name.find_first_of("[]=") != std::string_view::npos) {
+    const bool whole = closed && name.find_first_of("[]=") == std::string_view::npos;
+    if (!whole || name.empty()) {
       error(number, column, fmt::format("expected '[section]', got '{}'", shown(bare)));
       // What follows is checked as if the section were the one that was meant.
       name = trim(name.substr(0, name.find_first_of("[]=")));
@@ -128,7 +129,7 @@ class Scanner {
     std::vector<std::string_view> all = names;
     all.push_back("event.NAME");
     const std::string_view nearest = nearest_name(name, names);
-    if (closed)
+    if (whole && !name.empty())
       error(number, column,
             fmt::format("unknown section '{}'; {}", shown(name),
                         nearest.empty() ? fmt::format("expected one of {}", fmt::join(all, ", "))

@@ -120,9 +120,10 @@ TEST(Forks, EveryProblemIsReported) {
 /// The largest safe value that a refusal names.
 std::string safe_value(const std::string& text) {
   const std::string mark = "largest safe value ";
-  const std::size_t start = text.find(mark);
-  if (start == std::string::npos) return "";
-  return text.substr(start + mark.size(), text.find(' ', start + mark.size()) - start - mark.size());
+  const std::size_t found = text.find(mark);
+  if (found == std::string::npos) return "";
+  const std::size_t start = found + mark.size();
+  return text.substr(start, text.find(' ', start) - start);
 }
 
 TEST(Forks, LimitsNameALargestSafeValueThatIsSafeAndLargest) {

@@ -66,7 +66,7 @@ TEST(ParameterTable, EachKeyMovesItsOwnMemberAndNoOther) {
   for (const Parameter& parameter : parameters()) {
     Scenario scenario;
     std::string value = other_value(parameter);
-    if (value == default_text(parameter)) value = "2";  // a whole number whose default is lowest + 1
+    if (value == default_text(parameter)) value = "2";  // where the default is lowest + 1
     const auto error = set_parameter(scenario, parameter, value);
     ASSERT_FALSE(error) << parameter.key << ": " << error->text;
     for (const Parameter& other : parameters()) {
@@ -149,7 +149,8 @@ TEST(ParameterValues, ErrorsSayWhatWasFoundAndWhatIsExpected) {
   EXPECT_EQ(error_of("coupling.drag", "stoks"),
             "'stoks' is not known; expected stokes, schiller_naumann, dallavalle_di_felice, "
             "gidaspow or cylinder; did you mean 'stokes'?");
-  EXPECT_THAT(error_of("domain.sides", "free"), HasSubstr("expected no_slip, free_slip or periodic"));
+  EXPECT_THAT(error_of("domain.sides", "free"),
+              HasSubstr("expected no_slip, free_slip or periodic"));
   EXPECT_THAT(error_of("scenario.title", "a # b"), HasSubstr("'#'"));
   EXPECT_THAT(error_of("scenario.title", std::string(300, 'x')), HasSubstr("too long"));
 }

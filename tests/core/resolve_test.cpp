@@ -60,7 +60,7 @@ TEST(Resolve, TerminalSpeedsAreThoseOfTheBareLaws) {
   EXPECT_NEAR(terminal_speed(s), 0.05316, 1.5e-5);
   s.coupling.drag = Drag::cylinder;
   EXPECT_NEAR(terminal_speed(s), 0.06589, 1.5e-5);
-  // Stokes: 12 mu U = (rho_s - rho0) pi d^2 / 4 g for a disc with a sphere's Cd on its frontal area.
+  // Stokes: 12 mu U = (rho_s - rho0) g pi d^2 / 4, a sphere's Cd on the frontal area of a disc.
   s.coupling.drag = Drag::stokes;
   EXPECT_NEAR(terminal_speed(s), 250 * pi * 6.25e-6 / 4 * 9.81 / (12 * 0.01), 1e-9);
   s.grains.density = 1000;
