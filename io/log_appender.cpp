@@ -183,6 +183,9 @@ void LogAppender::foreign(const Record& record, std::span<const std::byte> body)
 
 void LogAppender::end() {
   if (!index_.empty()) write_index();
+  // Synced first, so that the end record's header says of all before it that it was durable.
+  write();
+  sync();
   records_.add(RecordKind::end, summary_.last_step, encode(summary_));
 }
 

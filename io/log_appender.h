@@ -59,7 +59,7 @@ class LogAppender {
   void gap(const GapMessage& message);
   /// Copies a record of a kind that this program does not know.
   void foreign(const Record& record, std::span<const std::byte> body);
-  /// Adds the outstanding index record and an end record.
+  /// Writes and syncs what is outstanding, the index record included, and adds an end record.
   void end();
   void write() { records_.write(); }
   void sync();

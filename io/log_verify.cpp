@@ -147,6 +147,7 @@ class Verifier {
     }
     chain_ = message.chain;
     last_step_ = step;
+    last_recorded_ = step;
     last_ = message;
     if (out_.steps++ == 0) first_step_ = step;
     const bool keyframe = record.header.kind == RecordKind::keyframe;
@@ -232,8 +233,8 @@ class Verifier {
 
   void check_end(const Record& record) {
     const EndMessage end = decode_end(record.message);
-    if (!last_step_ || interrupted_) return;
-    if (end.last_step != *last_step_ || end.digest != last_.digest || end.chain != last_.chain) {
+    if (out_.steps == 0 || interrupted_) return;
+    if (end.last_step != last_recorded_ || end.digest != last_.digest || end.chain != last_.chain) {
       damage(record.offset, "end record: does not name the step before it");
     }
     if (!any_bad_ && (end.steps != out_.steps || end.first_step != first_step_)) {
@@ -280,7 +281,8 @@ class Verifier {
   std::optional<std::size_t> open_damage_;
   std::uint64_t lost_from_ = 0;
 
-  std::optional<std::uint64_t> last_step_;
+  std::optional<std::uint64_t> last_step_;  // recorded, or named by a gap
+  std::uint64_t last_recorded_ = 0;
   std::uint64_t first_step_ = 0;
   StepMessage last_;
   std::optional<Digest> chain_;  // before the next step; nothing behind a gap
