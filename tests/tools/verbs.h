@@ -16,7 +16,7 @@ namespace varve::test {
 
 using Json = nlohmann::json;
 
-/// A disc thrown at the floor of a small closed box: contact after about a quarter of the 160 steps.
+/// A disc thrown at the floor of a small closed box: it touches after a quarter of the 160 steps.
 inline std::string disc_scene(const std::string& more = "") {
   return R"([domain]
 width = 1 cm
@@ -61,6 +61,29 @@ steps = 120
 [record]
 keyframe_steps = 32
 )" + more;
+}
+
+/// A scene that goes on for as long as one likes: two grains sink and lie.
+inline std::string long_scene() {
+  return R"([domain]
+width = 1.6 cm
+height = 1.6 cm
+[fluid]
+viscosity = 0.05 Pa.s
+spacing = 1 mm
+sound_speed = 1 m/s
+[grains]
+rows = 1
+columns = 2
+diameter = 2.5 mm
+density = 1500 kg/m3
+gap = 0.5
+lowest_y = 3 mm
+[time]
+steps = 1500
+[record]
+keyframe_steps = 100
+)";
 }
 
 /// Runs a verb; the test fails with its messages if it does not exit with `code`.
