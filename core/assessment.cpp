@@ -111,17 +111,20 @@ class Assessor {
     const double steps = static_cast<double>(a_.steps);
     const double particles = static_cast<double>(a_.fluid_particles + a_.grains);
     const double keyframes = 1 + std::floor(steps / static_cast<double>(s_.record.keyframe_steps));
-    // Settling grains with doubles in 2D take 3 to 10 bytes per particle and step, half of it with
-    // floats, and a keyframe compresses to between 0.6 and 1 of its size; a fluid at rest takes
-    // next to nothing.
+    // Settling grains with doubles in 2D take 7 to 10 bytes per particle and step at a quarter of
+    // the acoustic limit and 3 to 4 far below it, half of it with floats; a fluid at rest takes
+    // next to nothing. A keyframe compresses to between 0.6 and 1 of its size.
     const bool at_rest = a_.speeds.fluid == 0 && a_.speeds.grains == 0;
-    const double least = at_rest ? 0.01 : 2.5;
+    const double courant =
+        s_.has_fluid() ? a_.dt * s_.fluid.sound_speed / smoothing_length(s_) : 1.0;
+    const double least = at_rest ? 0.01 : courant > 0.15 ? 6.0 : 2.5;
+    const double most = at_rest ? 0.5 : 11.0;
     const double per_particle = real / 8 * d / 2;
     const bool digests = s_.record.tier == RecordTier::digests;
     const double deltas = digests ? 0 : steps / static_cast<double>(s_.record.every) * particles;
     a_.log_bytes_low =
         4096 + keyframes * 0.1 * bytes + steps * 120 + deltas * least * per_particle;
-    a_.log_bytes_high = 8192 + keyframes * bytes + steps * 600 + deltas * 11 * per_particle;
+    a_.log_bytes_high = 8192 + keyframes * bytes + steps * 600 + deltas * most * per_particle;
   }
 
   void warn_about_fluid() {
