@@ -186,6 +186,7 @@ class Decoder final : public FrameDecoder {
     switch (method) {
       case Method::residual_varint:
       case Method::residual_planes:
+      case Method::residual_bits:
         dynamic_[i]->decode(encoded, times_, zstd_, frame_.fields[i]);
         return;
       case Method::follows:

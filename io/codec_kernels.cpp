@@ -102,6 +102,111 @@ VARVE_INLINE void advance_body(const ImageOf<T>* bits, ImageOf<T>* newest, T* di
   }
 }
 
+/// Four times the binary logarithm of |x|, roughly: exponent and two bits of a float. 4 for 1.
+VARVE_INLINE std::int32_t quarter_bits(float x) {
+  const auto bits = static_cast<std::int32_t>(std::bit_cast<std::uint32_t>(x) & 0x7fffffffu);
+  const std::int32_t quarters = (bits >> 21) - (126 << 2);
+  return quarters < 0 ? 0 : quarters;
+}
+
+/// Level of the running mean after a shift: never negative.
+VARVE_INLINE std::int32_t shifted(std::int32_t level, std::int32_t shift) {
+  const std::int32_t sum = level + shift;
+  return sum < 0 ? 0 : sum > 4500 ? 4500 : sum;
+}
+
+template <class T>
+VARVE_INLINE void expect_body(const StageBlock& block, int shift, const ImageOf<T>* base,
+                              std::size_t n, ImageOf<T>* predicted, Expectation* expected) {
+  using Signed = std::make_signed_t<ImageOf<T>>;
+  constexpr float limit = sizeof(T) == 8 ? 4.0e18f : 1.0e9f;  // conversion to Signed is safe
+  alignas(64) float step[block_values];
+  alignas(64) std::int32_t code[block_values];
+  const float* const r1 = block.past[0];
+  const float* const r2 = block.past[1];
+  const float* const r3 = block.past[2];
+  const float* const r4 = block.past[3];
+  const std::uint16_t* const level0 = block.level[0];
+  const std::uint16_t* const level1 = block.level[1];
+  const std::uint16_t* const level2 = block.level[2];
+  const std::uint16_t* const level3 = block.level[3];
+  for (std::size_t i = 0; i < n; ++i) {
+    const float d1 = r1[i] - r2[i];
+    const float d2 = r2[i] - r3[i];
+    const float line = r1[i] + d1;
+    const float parabola = 3 * d1 + r3[i];
+    const float line_before = r2[i] + d2;
+    const float parabola_before = 3 * d2 + r4[i];
+    std::int32_t level = level0[i];
+    float next = 0;
+    float error = r1[i];
+    std::int32_t other = level1[i];
+    next = other < level ? r1[i] : next;
+    error = other < level ? d1 : error;
+    level = other < level ? other : level;
+    other = level2[i];
+    next = other < level ? line : next;
+    error = other < level ? r1[i] - line_before : error;
+    level = other < level ? other : level;
+    other = level3[i];
+    next = other < level ? parabola : next;
+    error = other < level ? r1[i] - parabola_before : error;
+    level = other < level ? other : level;
+
+    const std::int32_t change = quarter_bits(error) * 16 - level;
+    const std::int32_t now = shifted(level, shift);
+    const std::int32_t fine = now >> 5;
+    const std::int32_t coarse = now >> 6;
+    const std::int32_t height =
+        now < 256 ? fine : now < 512 ? 4 + coarse : 12 + (fine & 1);
+    const std::int32_t trend =
+        (change >= -95) + (change >= -31) + (change >= 32) + (change >= 96);
+    const std::int32_t offset = now < 512 ? 0 : coarse - 8;
+    const std::int32_t negative = error < 0 ? 128 : 0;
+    step[i] = next > -limit && next < limit ? next : 0.0f;
+    code[i] = (height * 5 + trend) | negative | (offset << 8);
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    predicted[i] = base[i] + static_cast<ImageOf<T>>(static_cast<Signed>(step[i]));
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    expected[i].context = static_cast<std::uint8_t>(code[i]);
+    expected[i].offset = static_cast<std::uint8_t>(code[i] >> 8);
+  }
+}
+
+/// Moves a running mean an eighth of the way to the newest error.
+VARVE_INLINE std::uint16_t moved_level(std::int32_t level, std::int32_t shift, float error) {
+  const std::int32_t now = shifted(level, shift);
+  return static_cast<std::uint16_t>(now + ((quarter_bits(error) * 16 - now + 4) >> 3));
+}
+
+template <class T>
+VARVE_INLINE void learn_body(const StageBlock& block, int shift, const ImageOf<T>* bits,
+                             const ImageOf<T>* base, std::size_t n) {
+  using Signed = std::make_signed_t<ImageOf<T>>;
+  alignas(64) float residual[block_values];
+  for (std::size_t i = 0; i < n; ++i) {
+    residual[i] = static_cast<float>(static_cast<Signed>(image_of_bits<T>(bits[i]) - base[i]));
+  }
+  const float* const r1 = block.past[0];
+  const float* const r2 = block.past[1];
+  const float* const r3 = block.past[2];
+  std::uint16_t* const level0 = block.level[0];
+  std::uint16_t* const level1 = block.level[1];
+  std::uint16_t* const level2 = block.level[2];
+  std::uint16_t* const level3 = block.level[3];
+  for (std::size_t i = 0; i < n; ++i) {
+    const float r = residual[i];
+    const float d1 = r1[i] - r2[i];
+    level0[i] = moved_level(level0[i], shift, r);
+    level1[i] = moved_level(level1[i], shift, r - r1[i]);
+    level2[i] = moved_level(level2[i], shift, r - (r1[i] + d1));
+    level3[i] = moved_level(level3[i], shift, r - (3 * d1 + r3[i]));
+  }
+  std::copy_n(residual, n, block.incoming);
+}
+
 #define VARVE_KERNEL_SET(NAME, TARGET)                                                            \
   template <class T>                                                                              \
   struct NAME {                                                                                   \
@@ -119,9 +224,22 @@ VARVE_INLINE void advance_body(const ImageOf<T>* bits, ImageOf<T>* newest, T* di
     TARGET static void advance(const U* bits, U* newest, T* difference, std::size_t n) {          \
       advance_body<T>(bits, newest, difference, n);                                               \
     }                                                                                             \
-    static constexpr Kernels<T> table{predict, fold, unfold, advance};                            \
+    TARGET static void expect(const StageBlock& block, int shift, const U* base, std::size_t n,   \
+                              U* predicted, Expectation* expected) {                              \
+      if constexpr (std::is_floating_point_v<T>) {                                                \
+        expect_body<T>(block, shift, base, n, predicted, expected);                               \
+      }                                                                                           \
+    }                                                                                             \
+    TARGET static void learn(const StageBlock& block, int shift, const U* bits, const U* base,    \
+                             std::size_t n) {                                                     \
+      if constexpr (std::is_floating_point_v<T>) {                                                \
+        learn_body<T>(block, shift, bits, base, n);                                               \
+      }                                                                                           \
+    }                                                                                             \
+    static constexpr Kernels<T> table{predict, fold, unfold, expect, learn, advance};             \
   };
 
+// Integers have no second stage.
 VARVE_KERNEL_SET(Baseline, )
 #ifdef VARVE_CODEC_X86
 VARVE_KERNEL_SET(Avx2, __attribute__((target("avx2,bmi,bmi2"))))

@@ -13,6 +13,24 @@ namespace varve::io::codec {
 /// Values that one kernel call handles at most: its scratch stays in the first-level cache.
 inline constexpr std::size_t block_values = 1024;
 
+/// What is known of a residual before it is read (codec_tans.h).
+struct Expectation {
+  std::uint8_t context;  ///< class of level and of its last change; bit 7: sign of the one before
+  std::uint8_t offset;   ///< bits of a residual whose symbol is 0 or 1
+};
+
+/// Past residuals that a second prediction is made from, and the candidates for it: the residual
+/// itself is expected to be 0, or to continue the past ones as a constant, a line or a parabola.
+inline constexpr unsigned past_residuals = 4;
+inline constexpr unsigned candidates = 4;
+
+/// A block of the second stage's memory.
+struct StageBlock {
+  const float* past[past_residuals];  ///< newest first
+  std::uint16_t* level[candidates];   ///< running mean of each candidate's error, 64 per bit
+  float* incoming;                    ///< where the newest residual goes; may be past[3]
+};
+
 template <class T>
 struct Kernels {
   using U = ImageOf<T>;
@@ -24,6 +42,12 @@ struct Kernels {
   void (*fold)(const U* bits, const U* predicted, std::size_t n, U* folded);
   /// Inverse of fold.
   void (*unfold)(const U* folded, const U* predicted, std::size_t n, U* bits);
+  /// Floating types only. For each value takes the candidate whose level is lowest, adds what it says
+  /// to the image `base`, and tells what is to be expected of the rest. `shift` is added to levels.
+  void (*expect)(const StageBlock& block, int shift, const U* base, std::size_t n, U* predicted,
+                 Expectation* expected);
+  /// Floating types only. Takes in the true residuals, image of bits[i] - base[i].
+  void (*learn)(const StageBlock& block, int shift, const U* bits, const U* base, std::size_t n);
   /// difference[i] = bits[i] - newest[i] as values; newest[i] = bits[i].
   void (*advance)(const U* bits, U* newest, T* difference, std::size_t n);
 };
