@@ -2,6 +2,7 @@
 #pragma once
 
 #include "core/engine.h"
+#include "core/engine_step_impl.h"
 #include "core/geometry_change.h"
 #include "core/parameters.h"
 
