@@ -181,8 +181,9 @@ int throughput(const Options& options) {
                                      {"7200+32", 0.06, 0.12, 4, 8},
                                      {"24000+32", 0.20, 0.12, 4, 8}};
   const std::string widest{core::name_of(core::best_instruction_set())};
-  const std::vector<Configuration> configurations = {
-      {"baseline, off", 0, false}, {widest + ", off", -1, false}, {widest + ", recording", -1, true}};
+  const std::vector<Configuration> configurations = {{"baseline, off", 0, false},
+                                                     {widest + ", off", -1, false},
+                                                     {widest + ", recording", -1, true}};
   const auto folder = std::filesystem::temp_directory_path() /
                       fmt::format("varve-throughput-{}", getpid());
   std::filesystem::create_directory(folder);
