@@ -40,11 +40,11 @@ class FrameEncoder {
   virtual void restart() = 0;
   /// Encodes all fields, in the schema's order; the frame becomes history. `keyframe` tells whether
   /// the record is self-contained. A population whose particles came or went does not need a
-  /// keyframe: where it has ascending ids, those that stay keep their history; where it has none, its
-  /// fields alone are stored whole. Fields that are called constant and change all the same are
+  /// keyframe: where it has ascending ids, those that stay keep their history; where it has none,
+  /// its fields alone are stored whole. Fields that are called constant and change all the same are
   /// stored whole as well. `frame.time` must be the frame's time, `frame.dt` the step's length for
-  /// the `follows` rule; frames may lie several steps apart. Throws LogError (mismatch) where counts
-  /// or sizes do not fit the schema; the next frame is then a keyframe.
+  /// the `follows` rule; frames may lie several steps apart. Throws LogError (mismatch) where
+  /// counts or sizes do not fit the schema; the next frame is then a keyframe.
   virtual std::vector<EncodedField> encode(const FrameView& frame, bool& keyframe) = 0;
 };
 

@@ -217,15 +217,14 @@ class TrackField final : public DynamicField {
       track_.predict(weights, first, n, base.data());
       kernels<T>().expect(block, shift, base.data(), n, predicted.data(), expected_.data() + first);
       track_.gather(frame.bytes, first, n, bits.data());
-      for (std::size_t i = 0; i < n; ++i) {
-        folded_[first + i] = image_of_bits<T>(bits[i]) - predicted[i];
-      }
+      U* const residuals = folded_.data() + first;
+      kernels<T>().subtract(bits.data(), predicted.data(), n, residuals);
+      kernels<T>().symbolise(residuals, expected_.data() + first, n, symbols_.data() + first);
       kernels<T>().learn(block, shift, bits.data(), base.data(), n);
       track_.advance(bits.data(), first, n);
     });
     track_.end_frame();
     stage_.end_frame();
-    TansEncoder<U>::symbolise(folded_, expected_, symbols_);
     const bool new_model = ++frames_since_model_ >= model_interval && improve_model(fresh);
     sink.u8(static_cast<std::uint8_t>((new_model ? has_model : 0) | (shift != 0 ? has_shift : 0) |
                                       (fresh ? is_fresh : 0)));
@@ -269,9 +268,7 @@ class TrackField final : public DynamicField {
         track_.predict(weights, first, n, base.data());
         kernels<T>().expect(block, shift, base.data(), n, predicted.data(), expected.data());
         decoder_.decode({expected.data(), n}, residual.data());
-        for (std::size_t i = 0; i < n; ++i) {
-          bits[i] = bits_of_image<T>(predicted[i] + residual[i]);
-        }
+        kernels<T>().add(residual.data(), predicted.data(), n, bits.data());
         kernels<T>().learn(block, shift, bits.data(), base.data(), n);
         track_.advance(bits.data(), first, n);
         track_.scatter(bits.data(), first, n, frame);

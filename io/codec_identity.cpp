@@ -107,8 +107,8 @@ void decode_runs(const FieldDescriptor& field, ByteSource& source, std::uint64_t
   }
 }
 
-/// Key `i` relative to the key before (`previous`, zeros at first): the first component that differs
-/// as a difference, the ones behind it as they are.
+/// Key `i` relative to the key before (`previous`, zeros at first): the first component that
+/// differs as a difference, the ones behind it as they are.
 void put_key(const Keys& keys, std::uint64_t i, std::vector<std::uint64_t>& previous,
              ByteSink& sink) {
   bool same = true;

@@ -19,12 +19,14 @@ bool ascending(const FieldDescriptor& field, std::span<const std::byte> ids, std
 
 /// Stores ascending ids whole.
 void encode_ids(const FieldDescriptor& field, const FieldView& ids, EncodedField& out);
-/// Inverse; throws LogError(damaged) unless the payload holds exactly `encoded.count` ascending ids.
+/// Inverse; throws LogError(damaged) unless the payload holds exactly `encoded.count` ascending
+/// ids.
 void decode_ids(const FieldDescriptor& field, const EncodedField& encoded,
                 std::span<std::byte> ids);
 
 /// Stores what leads from `before` to `after`, both ascending. `sources[i]` is the old index of the
-/// i-th particle or no_source. False, and nothing stored, where less than half of the particles stay.
+/// i-th particle or no_source. False, and nothing stored, where less than half of the particles
+/// stay.
 bool encode_edit(const FieldDescriptor& field, const FieldView& before, const FieldView& after,
                  EncodedField& out, std::vector<std::uint64_t>& sources);
 /// Inverse; sets `sources`, whose size is `encoded.count`, and fills `after`.

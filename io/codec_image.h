@@ -41,7 +41,8 @@ constexpr ImageOf<T> bits_of_image(ImageOf<T> image) {
   }
 }
 
-/// Small differences of either sign become small unsigned numbers: 0, -1, 1, -2 ... -> 0, 1, 2, 3 ...
+/// Small differences of either sign become small unsigned numbers: 0, -1, 1, -2 ... -> 0, 1, 2, 3
+/// ...
 template <class U>
 constexpr U zigzag(U difference) {
   using Signed = std::make_signed_t<U>;

@@ -4,12 +4,7 @@
 #include <bit>
 #include <type_traits>
 
-// Bodies are forced inline into wrappers that only differ in the instructions they may use. A
-// wrapper per width, chosen by hand, works with every sanitizer, which ifunc resolvers do not.
-#if defined(__x86_64__) && defined(__GNUC__)
-#define VARVE_CODEC_X86 1
-#endif
-#define VARVE_INLINE inline __attribute__((always_inline))
+#include "io/codec_dispatch.h"
 
 namespace varve::io::codec {
 namespace {
@@ -207,6 +202,37 @@ VARVE_INLINE void learn_body(const StageBlock& block, int shift, const ImageOf<T
   std::copy_n(residual, n, block.incoming);
 }
 
+/// Bits of a magnitude, by way of a float's exponent: vectors have no instruction of their own for
+/// it. Of neighbouring ones only the highest stays, so that the conversion cannot round up to the
+/// next power of two.
+template <class U>
+VARVE_INLINE U length_of(U magnitude) {
+  const U half = magnitude >> 1;
+  const auto thinned = static_cast<std::make_signed_t<U>>(half & ~(half >> 1));
+  const auto exponent = std::bit_cast<std::uint32_t>(static_cast<float>(thinned)) >> 23;
+  return (magnitude != 0 ? 1u : 0u) + (exponent != 0 ? exponent - 126 : 0u);
+}
+
+template <class T>
+VARVE_INLINE void symbolise_body(const ImageOf<T>* residuals, const Expectation* expected,
+                                 std::size_t n, std::uint8_t* symbols) {
+  using U = ImageOf<T>;
+  alignas(64) std::uint32_t code[block_values];  // length and sign
+  for (std::size_t i = 0; i < n; ++i) {
+    const U sign = residuals[i] >> (sizeof(U) * 8 - 1);
+    const U length = length_of<U>((residuals[i] ^ (U{0} - sign)) + sign);
+    code[i] = static_cast<std::uint32_t>(length * 2 + sign);
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    const std::uint32_t length = code[i] >> 1;
+    const std::uint32_t offset = expected[i].offset;
+    const std::uint32_t agree = length == 0 ? 0 : (code[i] & 1) ^ (expected[i].context >> 7);
+    const std::uint32_t symbol = (length - offset) * 2 + agree;  // huge where length < offset
+    const bool fits = (length > offset || (offset == 0 && length == 0)) && symbol < tans_symbols;
+    symbols[i] = static_cast<std::uint8_t>(fits ? symbol : tans_escape);
+  }
+}
+
 #define VARVE_KERNEL_SET(NAME, TARGET)                                                            \
   template <class T>                                                                              \
   struct NAME {                                                                                   \
@@ -236,7 +262,22 @@ VARVE_INLINE void learn_body(const StageBlock& block, int shift, const ImageOf<T
         learn_body<T>(block, shift, bits, base, n);                                               \
       }                                                                                           \
     }                                                                                             \
-    static constexpr Kernels<T> table{predict, fold, unfold, expect, learn, advance};             \
+    TARGET static void symbolise(const U* residuals, const Expectation* expected, std::size_t n,  \
+                                 std::uint8_t* symbols) {                                         \
+      symbolise_body<T>(residuals, expected, n, symbols);                                         \
+    }                                                                                             \
+    TARGET static void subtract(const U* bits, const U* predicted, std::size_t n, U* residuals) { \
+      for (std::size_t i = 0; i < n; ++i) {                                                       \
+        residuals[i] = image_of_bits<T>(bits[i]) - predicted[i];                                  \
+      }                                                                                           \
+    }                                                                                             \
+    TARGET static void add(const U* residuals, const U* predicted, std::size_t n, U* bits) {      \
+      for (std::size_t i = 0; i < n; ++i) {                                                       \
+        bits[i] = bits_of_image<T>(predicted[i] + residuals[i]);                                  \
+      }                                                                                           \
+    }                                                                                             \
+    static constexpr Kernels<T> table{predict, fold,     unfold,    subtract, add,                \
+                                      expect,  learn, symbolise, advance};                        \
   };
 
 // Integers have no second stage.

@@ -19,6 +19,10 @@ struct Expectation {
   std::uint8_t offset;   ///< bits of a residual whose symbol is 0 or 1
 };
 
+/// Symbols of the entropy coder; the one behind which length and sign follow as they are.
+inline constexpr unsigned tans_symbols = 32;
+inline constexpr unsigned tans_escape = 1;
+
 /// Past residuals that a second prediction is made from, and the candidates for it: the residual
 /// itself is expected to be 0, or to continue the past ones as a constant, a line or a parabola.
 inline constexpr unsigned past_residuals = 4;
@@ -42,12 +46,20 @@ struct Kernels {
   void (*fold)(const U* bits, const U* predicted, std::size_t n, U* folded);
   /// Inverse of fold.
   void (*unfold)(const U* folded, const U* predicted, std::size_t n, U* bits);
-  /// Floating types only. For each value takes the candidate whose level is lowest, adds what it says
-  /// to the image `base`, and tells what is to be expected of the rest. `shift` is added to levels.
+  /// residuals[i] = image of bits[i] - predicted[i].
+  void (*subtract)(const U* bits, const U* predicted, std::size_t n, U* residuals);
+  /// Inverse of subtract.
+  void (*add)(const U* residuals, const U* predicted, std::size_t n, U* bits);
+  /// Floating types only. For each value takes the candidate whose level is lowest, adds what it
+  /// says to the image `base`, and tells what is to be expected of the rest. `shift` is added to
+  /// levels.
   void (*expect)(const StageBlock& block, int shift, const U* base, std::size_t n, U* predicted,
                  Expectation* expected);
   /// Floating types only. Takes in the true residuals, image of bits[i] - base[i].
   void (*learn)(const StageBlock& block, int shift, const U* bits, const U* base, std::size_t n);
+  /// Symbols (codec_tans.h) of residuals, which are two's complement, under these expectations.
+  void (*symbolise)(const U* residuals, const Expectation* expected, std::size_t n,
+                    std::uint8_t* symbols);
   /// difference[i] = bits[i] - newest[i] as values; newest[i] = bits[i].
   void (*advance)(const U* bits, U* newest, T* difference, std::size_t n);
 };

@@ -1,6 +1,7 @@
 // The second stage of prediction: what the extrapolation left over is itself predicted, value by
 // value, by the candidate that did best for that value lately. Particles in smooth flow thereby get
-// a higher order than those in rough flow, and the running error tells how long a residual to expect.
+// a higher order than those in rough flow, and the running error tells how long a residual to
+// expect.
 #pragma once
 
 #include <array>

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstring>
 
+#include "io/codec_dispatch.h"
 #include "io/codec_image.h"
 
 namespace varve::io::codec {
@@ -230,7 +231,7 @@ struct BackwardWriter {
   std::uint32_t state = tans_states;
 
   /// n <= 56
-  void put(std::uint64_t value, unsigned n) {
+  VARVE_INLINE void put(std::uint64_t value, unsigned n) {
     bits = (bits << n) | value;
     count += n;
     store64(at - 8, (bits << 1) << (63 - count));
@@ -238,6 +239,173 @@ struct BackwardWriter {
     count &= 7;
   }
 };
+using Writers = std::array<BackwardWriter, tans_streams>;
+
+/// One value: raw bits first, then what an escape needs, then state bits, since all is read
+/// backwards.
+template <class U>
+VARVE_INLINE void put_value(const EncodeTables& tables, U residual, Expectation expected,
+                            unsigned symbol, BackwardWriter& writer) {
+  constexpr unsigned combined_max = 46;  // raw bits that fit into one put() with the state's
+  const unsigned context = expected.context & 0x7f;
+  const U sign = residual >> (sizeof(U) * 8 - 1);
+  const U magnitude = (residual ^ (U{0} - sign)) + sign;
+  const unsigned length = bit_length(magnitude);
+  const unsigned raw = length - (length != 0);
+  const std::uint64_t raw_bits = low_bits(magnitude, raw);
+  const bool escaped = (tables.possible[context] >> symbol & 1) == 0 || symbol == tans_escape;
+  const bool apart = escaped || raw > combined_max;
+  if (apart) [[unlikely]] {
+    if (raw > 32) {
+      writer.put(raw_bits >> 32, raw - 32);
+    }
+    writer.put(raw_bits & 0xffffffffu, std::min(raw, 32u));
+    if (escaped) {
+      symbol = tans_escape;
+      writer.put(length * 2 + static_cast<unsigned>(sign), 8);
+    }
+  }
+  const EncodeTables::Step step = tables.step[context][symbol];
+  const unsigned bits = (writer.state + step.delta_bits) >> 16;
+  const std::uint64_t state_bits = low_bits(writer.state, bits);
+  const auto index = static_cast<std::int32_t>(writer.state >> bits) + step.delta_state;
+  writer.state = tables.next[context][static_cast<std::size_t>(index)];
+  writer.put(apart ? state_bits : (raw_bits << bits) | state_bits, apart ? bits : raw + bits);
+}
+
+template <class U>
+VARVE_INLINE void put_run_body(const EncodeTables& tables, const U* residuals,
+                               const Expectation* expected, const std::uint8_t* symbols,
+                               std::size_t n, Writers& all) {
+  BackwardWriter w0 = all[0], w1 = all[1], w2 = all[2], w3 = all[3];
+  std::size_t i = n;
+  for (; i % tans_streams != 0; --i) {
+    BackwardWriter& writer = i % tans_streams == 3 ? w2 : i % tans_streams == 2 ? w1 : w0;
+    put_value(tables, residuals[i - 1], expected[i - 1], symbols[i - 1], writer);
+  }
+  for (; i > 0; i -= tans_streams) {
+    put_value(tables, residuals[i - 1], expected[i - 1], symbols[i - 1], w3);
+    put_value(tables, residuals[i - 2], expected[i - 2], symbols[i - 2], w2);
+    put_value(tables, residuals[i - 3], expected[i - 3], symbols[i - 3], w1);
+    put_value(tables, residuals[i - 4], expected[i - 4], symbols[i - 4], w0);
+  }
+  all = {w0, w1, w2, w3};
+}
+
+/// One stream while it is read.
+struct BitReader {
+  std::uint64_t bit;
+  std::uint32_t state;
+};
+
+template <class U>
+VARVE_INLINE U take_value(const DecodeTables& tables, const std::byte* data, Expectation expected,
+                          BitReader& reader) {
+  constexpr unsigned window_raw_max = 40;  // of 57 bits in a window: 9 of the state, 8 of an escape
+  const DecodeTables::Step step = tables.step[expected.context & 0x7f][reader.state];
+  std::uint64_t window = load64(data + (reader.bit >> 3)) >> (reader.bit & 7);
+  reader.state = step.base + static_cast<std::uint32_t>(low_bits(window, step.bits));
+  window >>= step.bits;
+  std::uint64_t at = reader.bit + step.bits;
+  unsigned length = (step.symbol >> 1) + expected.offset;
+  unsigned negative = (step.symbol & 1u) ^ (expected.context >> 7);
+  if (step.symbol == tans_escape) [[unlikely]] {
+    length = static_cast<unsigned>(window & 0xff) >> 1;
+    negative = static_cast<unsigned>(window & 1);
+    at += 8;
+    window >>= 8;
+  }
+  const unsigned raw = (length - (length != 0)) & 63;
+  std::uint64_t bits = low_bits(window, raw);
+  if (raw > window_raw_max) [[unlikely]] {
+    const std::uint64_t low = load64(data + (at >> 3)) >> (at & 7);
+    const std::uint64_t high = load64(data + ((at + 32) >> 3)) >> (at & 7);
+    bits = (low & 0xffffffffu) | (low_bits(high, raw - 32) << 32);
+  }
+  reader.bit = at + raw;
+  const auto magnitude =
+      static_cast<U>(bits | (static_cast<std::uint64_t>(length != 0) << raw));
+  const U mask = U{0} - static_cast<U>(negative);
+  return (magnitude ^ mask) - mask;
+}
+
+/// Reads rows of four values; false as soon as a stream has run past its end.
+template <class U>
+VARVE_INLINE bool take_rows_body(const DecodeTables& tables, const std::byte* data,
+                                 const Expectation* expected, std::size_t n,
+                                 const std::uint64_t* ends, BitReader* readers, U* residuals) {
+  BitReader r0 = readers[0], r1 = readers[1], r2 = readers[2], r3 = readers[3];
+  const std::uint64_t e0 = ends[0], e1 = ends[1], e2 = ends[2], e3 = ends[3];
+  for (std::size_t i = 0; i + tans_streams <= n; i += tans_streams) {
+    residuals[i] = take_value<U>(tables, data, expected[i], r0);
+    residuals[i + 1] = take_value<U>(tables, data, expected[i + 1], r1);
+    residuals[i + 2] = take_value<U>(tables, data, expected[i + 2], r2);
+    residuals[i + 3] = take_value<U>(tables, data, expected[i + 3], r3);
+    if (r0.bit > e0 || r1.bit > e1 || r2.bit > e2 || r3.bit > e3) [[unlikely]] {
+      return false;
+    }
+  }
+  readers[0] = r0, readers[1] = r1, readers[2] = r2, readers[3] = r3;
+  return true;
+}
+
+template <class U>
+using PutRun = void (*)(const EncodeTables&, const U*, const Expectation*, const std::uint8_t*,
+                        std::size_t, Writers&);
+template <class U>
+using TakeRows = bool (*)(const DecodeTables&, const std::byte*, const Expectation*, std::size_t,
+                          const std::uint64_t*, BitReader*, U*);
+
+#define VARVE_TANS_SET(NAME, TARGET)                                                              \
+  template <class U>                                                                              \
+  struct NAME {                                                                                   \
+    TARGET static void put_run(const EncodeTables& tables, const U* residuals,                    \
+                               const Expectation* expected, const std::uint8_t* symbols,          \
+                               std::size_t n, Writers& writers) {                                 \
+      put_run_body<U>(tables, residuals, expected, symbols, n, writers);                          \
+    }                                                                                             \
+    TARGET static bool take_rows(const DecodeTables& tables, const std::byte* data,               \
+                                 const Expectation* expected, std::size_t n,                      \
+                                 const std::uint64_t* ends, BitReader* readers, U* residuals) {   \
+      return take_rows_body<U>(tables, data, expected, n, ends, readers, residuals);              \
+    }                                                                                             \
+  };
+
+VARVE_TANS_SET(AnyMachine, )
+#ifdef VARVE_CODEC_X86
+VARVE_TANS_SET(BitInstructions, __attribute__((target("bmi,bmi2,lzcnt"))))
+#endif
+
+bool has_bit_instructions() {
+#ifdef VARVE_CODEC_X86
+  return __builtin_cpu_supports("bmi") && __builtin_cpu_supports("bmi2") &&
+         __builtin_cpu_supports("avx2");  // lzcnt came with avx2 and has no name of its own here
+#else
+  return false;
+#endif
+}
+
+template <class U>
+PutRun<U> put_run() {
+#ifdef VARVE_CODEC_X86
+  static const PutRun<U> chosen =
+      has_bit_instructions() ? &BitInstructions<U>::put_run : &AnyMachine<U>::put_run;
+  return chosen;
+#else
+  return &AnyMachine<U>::put_run;
+#endif
+}
+
+template <class U>
+TakeRows<U> take_rows() {
+#ifdef VARVE_CODEC_X86
+  static const TakeRows<U> chosen =
+      has_bit_instructions() ? &BitInstructions<U>::take_rows : &AnyMachine<U>::take_rows;
+  return chosen;
+#else
+  return &AnyMachine<U>::take_rows;
+#endif
+}
 
 }  // namespace
 
@@ -255,86 +423,33 @@ void TansEncoder<U>::set_model(const Model& model) {
 }
 
 template <class U>
-void TansEncoder<U>::symbolise(std::span<const U> residuals, std::span<const Expectation> expected,
-                               std::span<std::uint8_t> symbols) {
-  constexpr unsigned top = sizeof(U) * 8 - 1;
-  for (std::size_t i = 0; i < residuals.size(); ++i) {
-    const U sign = residuals[i] >> top;
-    const U magnitude = sign != 0 ? U{0} - residuals[i] : residuals[i];
-    const unsigned length = bit_length(magnitude);
-    const unsigned agree = length == 0 ? 0 : static_cast<unsigned>(sign) ^ (expected[i].context >> 7);
-    const unsigned offset = expected[i].offset;
-    const unsigned symbol = (length - offset) * 2 + agree;  // huge where length < offset
-    const bool fits = length >= offset + (offset != 0) && symbol < tans_symbols;
-    symbols[i] = static_cast<std::uint8_t>(fits ? symbol : tans_escape);
-  }
-}
-
-template <class U>
 void TansEncoder<U>::encode(std::span<const U> residuals, std::span<const Expectation> expected,
                             std::span<const std::uint8_t> symbols, std::size_t run,
                             std::vector<std::byte>& out) {
-  constexpr unsigned top = sizeof(U) * 8 - 1;
   constexpr std::size_t value_bytes_max = 11;  // 9 state bits, 8 of an escape, 63 raw ones
-  std::array<BackwardWriter, tans_streams> writers;
+  Writers writers;
   const std::size_t runs = run == 0 ? 0 : residuals.size() / run;
   const std::size_t values_max = runs * (run / tans_streams + 1);
   for (unsigned k = 0; k < tans_streams; ++k) {
     buffers_[k].resize(values_max * value_bytes_max + 16);
     writers[k].at = buffers_[k].data() + buffers_[k].size();
   }
-  const EncodeTables& tables = *tables_;
-  const auto put = [&](BackwardWriter& writer, std::size_t i) {
-    const unsigned context = expected[i].context & 0x7f;
-    const U sign = residuals[i] >> top;
-    const U magnitude = sign != 0 ? U{0} - residuals[i] : residuals[i];
-    const unsigned length = bit_length(magnitude);
-    const unsigned raw = length - (length != 0);
-    unsigned symbol = symbols[i];
-    const std::uint64_t raw_bits = low_bits(magnitude, raw);
-    if (raw > 46) [[unlikely]] {
-      writer.put(raw_bits >> 32, raw - 32);
-      writer.put(raw_bits & 0xffffffffu, 32);
-    }
-    if ((tables.possible[context] >> symbol & 1) == 0 || symbol == tans_escape) [[unlikely]] {
-      symbol = tans_escape;
-      if (raw <= 46) {
-        writer.put(raw_bits, raw);
-      }
-      writer.put(length * 2 + static_cast<unsigned>(sign), 8);
-    }
-    const EncodeTables::Step step = tables.step[context][symbol];
-    const unsigned bits = (writer.state + step.delta_bits) >> 16;
-    const std::uint64_t state_bits = low_bits(writer.state, bits);
-    const auto index = static_cast<std::int32_t>(writer.state >> bits) + step.delta_state;
-    writer.state = tables.next[context][static_cast<std::size_t>(index)];
-    if (raw > 46 || symbol == tans_escape) [[unlikely]] {
-      writer.put(state_bits, bits);
-    } else {
-      writer.put((raw_bits << bits) | state_bits, raw + bits);
-    }
-  };
   for (std::size_t r = runs; r-- > 0;) {
-    const std::size_t first = r * run;
-    std::size_t i = run;
-    for (; i % tans_streams != 0; --i) {
-      put(writers[(i - 1) % tans_streams], first + i - 1);
-    }
-    for (; i > 0; i -= tans_streams) {
-      put(writers[3], first + i - 1);
-      put(writers[2], first + i - 2);
-      put(writers[1], first + i - 3);
-      put(writers[0], first + i - 4);
-    }
+    put_run<U>()(*tables_, residuals.data() + r * run, expected.data() + r * run,
+                 symbols.data() + r * run, run, writers);
   }
-  ByteSink sink(out);
   std::array<std::size_t, tans_streams> sizes{};
+  std::size_t sum = 0;
   for (unsigned k = 0; k < tans_streams; ++k) {
-    BackwardWriter& writer = writers[k];
-    const unsigned skip = (8 - writer.count) & 7;
-    sink.u16(static_cast<std::uint16_t>((writer.state - tans_states) | (skip << tans_log)));
-    writer.at -= writer.count > 0;  // put() has left the last bits at the top of the byte below
-    sizes[k] = static_cast<std::size_t>(buffers_[k].data() + buffers_[k].size() - writer.at);
+    writers[k].at -= writers[k].count > 0;  // put() has left the last bits at the top of that byte
+    sizes[k] = static_cast<std::size_t>(buffers_[k].data() + buffers_[k].size() - writers[k].at);
+    sum += sizes[k];
+  }
+  out.reserve(out.size() + sum + tans_streams * 12);
+  ByteSink sink(out);
+  for (unsigned k = 0; k < tans_streams; ++k) {
+    const unsigned skip = (8 - writers[k].count) & 7;
+    sink.u16(static_cast<std::uint16_t>((writers[k].state - tans_states) | (skip << tans_log)));
     sink.varint(sizes[k]);
   }
   for (unsigned k = 0; k < tans_streams; ++k) {
@@ -390,60 +505,26 @@ void TansDecoder<U>::begin(ByteSource& source) {
 
 template <class U>
 void TansDecoder<U>::decode(std::span<const Expectation> expected, U* residuals) {
-  const DecodeTables& tables = *tables_;
-  const std::byte* const data = data_.data();
-  std::array<Stream, tans_streams> streams = streams_;
-  const auto take = [&](Stream& stream, std::size_t i) {
-    const Expectation known = expected[i];
-    const DecodeTables::Step step = tables.step[known.context & 0x7f][stream.state];
-    std::uint64_t window = load64(data + (stream.bit >> 3)) >> (stream.bit & 7);
-    stream.state = step.base + static_cast<std::uint32_t>(low_bits(window, step.bits));
-    window >>= step.bits;
-    stream.bit += step.bits;
-    unsigned length = (step.symbol >> 1) + known.offset;
-    unsigned negative = (step.symbol & 1) ^ (known.context >> 7);
-    if (step.symbol == tans_escape) [[unlikely]] {
-      length = static_cast<unsigned>(window & 0xff) >> 1;
-      negative = static_cast<unsigned>(window & 1);
-      stream.bit += 8;
-      window >>= 8;
-    }
-    const unsigned raw = (length - (length != 0)) & 63;
-    std::uint64_t bits;
-    if (raw > 40) [[unlikely]] {
-      bits = (load64(data + (stream.bit >> 3)) >> (stream.bit & 7)) & 0xffffffffu;
-      const std::uint64_t upper = low_bits(load64(data + ((stream.bit + 32) >> 3)) >>
-                                               ((stream.bit + 32) & 7),
-                                           raw - 32);
-      bits |= upper << 32;
-    } else {
-      bits = low_bits(window, raw);
-    }
-    stream.bit += raw;
-    const auto magnitude =
-        static_cast<U>(length != 0 ? bits | (std::uint64_t{1} << raw) : std::uint64_t{0});
-    const U mask = U{0} - static_cast<U>(negative);
-    residuals[i] = (magnitude ^ mask) - mask;
-  };
-  std::size_t i = 0;
-  for (; i + tans_streams <= expected.size(); i += tans_streams) {
-    take(streams[0], i);
-    take(streams[1], i + 1);
-    take(streams[2], i + 2);
-    take(streams[3], i + 3);
-    if (((streams[0].end - streams[0].bit) | (streams[1].end - streams[1].bit) |
-         (streams[2].end - streams[2].bit) | (streams[3].end - streams[3].bit)) >>
-        63) [[unlikely]] {
-      fail_damaged(field_, "a stream of bits ends early");
-    }
+  std::array<BitReader, tans_streams> readers;
+  std::array<std::uint64_t, tans_streams> ends;
+  for (unsigned k = 0; k < tans_streams; ++k) {
+    readers[k] = {streams_[k].bit, streams_[k].state};
+    ends[k] = streams_[k].end;
   }
-  for (unsigned k = 0; i < expected.size(); ++i, ++k) {
-    take(streams[k], i);
-    if (streams[k].bit > streams[k].end) {
-      fail_damaged(field_, "a stream of bits ends early");
-    }
+  bool whole = take_rows<U>()(*tables_, data_.data(), expected.data(), expected.size(),
+                              ends.data(), readers.data(), residuals);
+  std::size_t i = expected.size() / tans_streams * tans_streams;
+  for (unsigned k = 0; whole && i < expected.size(); ++i, ++k) {
+    residuals[i] = take_value<U>(*tables_, data_.data(), expected[i], readers[k]);
+    whole = readers[k].bit <= ends[k];
   }
-  streams_ = streams;
+  if (!whole) {
+    fail_damaged(field_, "a stream of bits ends early");
+  }
+  for (unsigned k = 0; k < tans_streams; ++k) {
+    streams_[k].bit = readers[k].bit;
+    streams_[k].state = readers[k].state;
+  }
 }
 
 template <class U>

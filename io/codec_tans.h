@@ -18,11 +18,8 @@ namespace varve::io::codec {
 
 inline constexpr unsigned tans_log = 9;  ///< states per context: 2^9
 inline constexpr unsigned tans_states = 1u << tans_log;
-inline constexpr unsigned tans_symbols = 32;
 inline constexpr unsigned tans_contexts = 70;
 inline constexpr unsigned tans_streams = 4;
-/// Symbol behind which length and sign follow as they are.
-inline constexpr unsigned tans_escape = 1;
 
 /// How often each symbol is expected, in 15 classes a factor sqrt(2) apart; 0: never.
 using SymbolClasses = std::array<std::uint8_t, tans_symbols>;
@@ -57,11 +54,8 @@ class TansEncoder {
   TansEncoder();
   ~TansEncoder();
   void set_model(const Model& model);
-  /// Symbols of residuals (two's complement) under these expectations.
-  static void symbolise(std::span<const U> residuals, std::span<const Expectation> expected,
-                        std::span<std::uint8_t> symbols);
-  /// Appends the four streams. `runs` are the lengths of the pieces that are coded one after the
-  /// other; stream k takes values k, k+4, k+8 ... of each.
+  /// Appends the four streams. The values come in runs of `run`, coded one after the other; stream
+  /// k takes values k, k+4, k+8 ... of each run.
   void encode(std::span<const U> residuals, std::span<const Expectation> expected,
               std::span<const std::uint8_t> symbols, std::size_t run, std::vector<std::byte>& out);
 

@@ -18,8 +18,8 @@ namespace varve::io::codec {
 /// Old index of a particle that did not exist before.
 inline constexpr std::uint64_t no_source = ~std::uint64_t{0};
 
-/// Frames are particle-major (x0 y0 x1 y1 ...), the memory is component-major (x0 x1 ... y0 y1 ...):
-/// value v = component * count + particle.
+/// Frames are particle-major (x0 y0 x1 y1 ...), the memory is component-major (x0 x1 ... y0 y1
+/// ...): value v = component * count + particle.
 template <class T>
 class Track {
  public:
@@ -46,8 +46,8 @@ class Track {
   /// Writes them into a frame.
   void scatter(const U* bits, std::size_t first, std::size_t n, std::span<std::byte> frame) const;
 
-  /// Between begin_frame and end_frame, every value of the new frame is handed over once, in blocks,
-  /// each after its last prediction: the new differences overwrite the oldest ones.
+  /// Between begin_frame and end_frame, every value of the new frame is handed over once, in
+  /// blocks, each after its last prediction: the new differences overwrite the oldest ones.
   void begin_frame();
   void advance(const U* bits, std::size_t first, std::size_t n);
   void end_frame();
