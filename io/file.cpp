@@ -45,6 +45,7 @@ class PosixFile final : public File {
   }
 
   const std::string& path() const override { return path_; }
+  void set_path(std::string path) override { path_ = std::move(path); }
 
   std::uint64_t size() const override {
     struct stat info {};

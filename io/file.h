@@ -14,7 +14,10 @@ namespace varve::io {
 class File {
  public:
   virtual ~File() = default;
+  /// The name that messages give.
   virtual const std::string& path() const = 0;
+  /// Another name was given to the open file.
+  virtual void set_path(std::string path) = 0;
   /// Current length in bytes.
   virtual std::uint64_t size() const = 0;
   /// Reads at `offset`; returns the bytes read, fewer than asked for only at the file's end.

@@ -335,6 +335,7 @@ std::unique_ptr<LogWriter> LogWriter::create(const std::string& path, const Gene
     log.write();
     log.sync();
     files.rename(temporary, path);
+    file->set_path(path);
     files.sync_directory(path);
     auto writer = std::make_unique<LogWriterImpl>(path, std::move(own), particles_max, options,
                                                   std::move(lock), std::move(file),

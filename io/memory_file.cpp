@@ -72,6 +72,7 @@ class MemoryFileSystem::MemoryFile final : public File {
       : shared_(std::move(shared)), node_(std::move(node)), path_(std::move(path)) {}
 
   const std::string& path() const override { return path_; }
+  void set_path(std::string path) override { path_ = std::move(path); }
 
   std::uint64_t size() const override {
     const std::lock_guard guard(shared_->mutex);

@@ -4,6 +4,8 @@
 #include <zstd.h>
 
 #include <cstring>
+#include <memory>
+#include <new>
 
 #include "io/errors.h"
 
@@ -13,6 +15,24 @@ namespace {
 
 constexpr int zstd_level = 1;
 constexpr std::size_t smallest_packed = 128;  // a frame's own overhead eats the gain below
+
+// One context of each per thread: making one costs more than packing a small message.
+struct FreeContext {
+  void operator()(ZSTD_CCtx* context) const { ZSTD_freeCCtx(context); }
+  void operator()(ZSTD_DCtx* context) const { ZSTD_freeDCtx(context); }
+};
+
+ZSTD_CCtx* compressor() {
+  thread_local const std::unique_ptr<ZSTD_CCtx, FreeContext> context(ZSTD_createCCtx());
+  if (!context) throw std::bad_alloc();
+  return context.get();
+}
+
+ZSTD_DCtx* decompressor() {
+  thread_local const std::unique_ptr<ZSTD_DCtx, FreeContext> context(ZSTD_createDCtx());
+  if (!context) throw std::bad_alloc();
+  return context.get();
+}
 
 [[noreturn]] void damaged(const std::string& what, const std::string& text) {
   throw LogError(ErrorKind::damaged, "", what + ": " + text);
@@ -24,7 +44,8 @@ Packing pack(std::span<const std::byte> raw, std::vector<std::byte>& stored, con
   if (raw.size() >= smallest_packed) {
     stored.resize(ZSTD_compressBound(raw.size()));
     const std::size_t size =
-        ZSTD_compress(stored.data(), stored.size(), raw.data(), raw.size(), zstd_level);
+        ZSTD_compressCCtx(compressor(), stored.data(), stored.size(), raw.data(), raw.size(),
+                          zstd_level);
     const bool accepted =
         !ZSTD_isError(size) && size < raw.size() &&
         (raw.size() <= limits.ratio_free_bytes || raw.size() / limits.ratio_max < size);
@@ -73,8 +94,8 @@ void unpack(Packing packing, std::span<const std::byte> stored, std::span<std::b
   if (ZSTD_getDictID_fromFrame(stored.data(), stored.size()) != 0) {
     damaged(what, "the zstd frame asks for a dictionary");
   }
-  const std::size_t got =
-      ZSTD_decompress(out.data(), out.size(), stored.data(), stored.size());
+  const std::size_t got = ZSTD_decompressDCtx(decompressor(), out.data(), out.size(),
+                                              stored.data(), stored.size());
   if (ZSTD_isError(got)) damaged(what, fmt::format("zstd: {}", ZSTD_getErrorName(got)));
   if (got != out.size()) {
     damaged(what, fmt::format("zstd gave {} bytes where {} are declared", got, out.size()));
