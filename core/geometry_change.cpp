@@ -49,8 +49,6 @@ struct Move {
   }
 };
 
-double grain_area(const Scenario& s) { return 0.25 * pi * s.grains.diameter * s.grains.diameter; }
-
 std::string id_list(const std::vector<std::uint64_t>& ids) {
   constexpr std::size_t shown_max = 20;
   std::string text;
@@ -184,6 +182,29 @@ void follow_porosity(DoubleState& state, const std::vector<double>& eps_before,
   }
 }
 
+/// [m2] Room for fluid in a full box: the sum of eps dx^2 over a lattice of fluid at rest, so that it
+/// counts as much of each grain as the fluid there will feel of it.
+double room_for_fluid(const Scenario& scenario, const DoubleState& with_grains) {
+  const double dx = scenario.fluid.spacing;
+  const Box<2> box = domain_box(scenario);
+  DoubleState lattice;
+  lattice.grains = with_grains.grains;
+  const std::int64_t columns = nearest_integer(box.length(0) / dx);
+  const std::int64_t rows = nearest_integer(box.length(1) / dx);
+  for (std::int64_t j = 0; j < rows; ++j)
+    for (std::int64_t i = 0; i < columns; ++i)
+      lattice.fluid.position.emplace_back(box.lower[0] + (static_cast<double>(i) + 0.5) * dx,
+                                          box.lower[1] + (static_cast<double>(j) + 0.5) * dx);
+  const std::size_t count = lattice.fluid.position.size();
+  lattice.fluid.id.resize(count);
+  lattice.fluid.velocity.assign(count, Vec<double, 2>::Zero());
+  lattice.fluid.mass.assign(count, dx * dx);
+  lattice.fluid.superficial_density.assign(count, 1.0);
+  double sum = 0;
+  for (const double eps : floored_porosity(scenario, lattice)) sum += eps;
+  return sum * dx * dx;
+}
+
 /// [m] Height of the fluid beside a side wall: the volume in a strip of four spacings, per width.
 double surface_beside(const Move& move, const DoubleState& state, bool left) {
   const Box<2> box = move.old_box();
@@ -292,29 +313,32 @@ double clearance(const DoubleState& state, std::size_t a, const Vec<double, 2>& 
 }
 
 /// Draws fluid that is still outside to dx/2 inside. It may fall onto a particle of the outermost
-/// column, and two at one point would never part: it then goes half a spacing up or down.
+/// column, and two at one point would never part: it then goes half a spacing up or down, and where
+/// that is taken too half a spacing further in.
 std::uint64_t pull_inside(const Move& move, DoubleState& state) {
+  struct Site {
+    double depth, up;  // in spacings
+  };
+  constexpr Site sites[] = {{0.5, 0}, {0.5, 0.5}, {0.5, -0.5}, {1, 0}, {1, 0.5}, {1, -0.5}};
+  constexpr double enough = 0.49;
   const double dx = move.before.fluid.spacing;
   const Box<2> box = move.new_box();
   std::uint64_t pulled = 0;
   for (std::size_t a = 0; a < state.fluid.size(); ++a) {
-    auto& x = state.fluid.position[a];
+    const Vec<double, 2> x = state.fluid.position[a];
     if (move.beyond(x[0]) <= 0) continue;
     ++pulled;
-    Vec<double, 2> best = x;
-    double best_clearance = -1;
-    for (const double shift : {0.0, 0.5, -0.5}) {
-      Vec<double, 2> site(move.inside(x[0], 0.5 * dx), x[1] + shift * dx);
-      if (site[1] < box.lower[1] || site[1] >= box.upper[1]) continue;
-      const double free = clearance(state, a, site, box);
-      if (free <= best_clearance) continue;
-      best = site;
-      best_clearance = free;
-      if (free >= 0.5 * dx) break;
+    double widest = -1;
+    for (const Site& site : sites) {
+      const Vec<double, 2> place(move.inside(x[0], site.depth * dx), x[1] + site.up * dx);
+      const bool leaves = place[1] < box.lower[1] || place[1] >= box.upper[1];
+      if (site.up != 0 && leaves) continue;
+      const double free = clearance(state, a, place, box);
+      if (free <= widest) continue;
+      state.fluid.position[a] = place;
+      widest = free;
+      if (free >= enough * dx) break;
     }
-    x = best;
-    // Outside in y as well (a step may carry fluid a little across a wall): only x is corrected.
-    if (best_clearance < 0) x[0] = move.inside(x[0], 0.5 * dx);
   }
   return pulled;
 }
@@ -344,8 +368,9 @@ Narrowed narrowed(const Move& move, const DoubleState& state, const std::vector<
   return result;
 }
 
-void narrow_fluid(const Move& move, const std::vector<double>& eps_before, DoubleState& state,
-                  GeometryReport& report) {
+/// `room_lost` [m2]: swept volume less the volume of grains in it, by which the fluid gets less.
+void narrow_fluid(const Move& move, const std::vector<double>& eps_before, double room_lost,
+                  DoubleState& state, GeometryReport& report) {
   const Fluid& f = move.before.fluid;
   const double particle = f.density * f.spacing * f.spacing;
   std::vector<double> beyond(state.fluid.size());
@@ -362,10 +387,7 @@ void narrow_fluid(const Move& move, const std::vector<double>& eps_before, Doubl
   std::size_t count = outside;
   Narrowed best = narrowed(move, state, eps_before, order, count);
   if (move.closed()) {
-    double swept = -(move.left_outward + move.right_outward) * move.before.domain.height;
-    if (move.before.coupling.mode == CouplingMode::two_way && move.before.is_coupled())
-      swept -= grain_area(move.before) * static_cast<double>(report.grains_removed.size());
-    const double target = total_mass(state) - f.density * swept;
+    const double target = total_mass(state) - f.density * room_lost;
     // Masses adjust to what is removed, so the number is found by correction; a few rounds do.
     for (int round = 0; round < 20; ++round) {
       const double off = best.mass - target;
@@ -454,13 +476,19 @@ GeometryReport change_width(const Scenario& before, double new_width, const Chan
 
   DoubleState changed = converted<D, DoublePrecision>(state);
   std::vector<double> eps_before;
+  double room_before = 0;
   if (outward < 0) {
-    if (before.has_fluid()) eps_before = floored_porosity(before, changed);
+    if (before.has_fluid()) {
+      eps_before = floored_porosity(before, changed);
+      room_before = room_for_fluid(before, changed);
+    }
     settle_grains(move, options.outside, changed, report);
   }
   if (outward != 0) prune_contacts(move, changed, report);
   if (before.has_fluid() && outward > 0) widen_fluid(move, changed, report);
-  if (before.has_fluid() && outward < 0) narrow_fluid(move, eps_before, changed, report);
+  if (before.has_fluid() && outward < 0)
+    narrow_fluid(move, eps_before, room_before - room_for_fluid(move.after, changed), changed,
+                 report);
 
   State<D, P> result = converted<D, P>(changed);
   balance(state, result, report);

@@ -38,20 +38,24 @@ struct GeometryReport {
 };
 
 /// Changes the width of `state`, which belongs to `before`.
+///
 /// Wider: columns of new fluid at old wall +- (k + 1/2) dx, at rest, from the bottom to the top
 /// (under a free surface: to the surface beside the wall), m = eps rho0 dx^D with eps from the
-/// grains; excess pressure = the fluid's mean, with full pressure on top of the hydrostatic one,
-/// and just hydrostatic below a free surface. Ids follow the highest present one, row by row from
-/// the bottom.
+/// grains; excess pressure = the fluid's mean, with full pressure on top of the hydrostatic one, and
+/// just hydrostatic below a free surface. Ids follow the highest present one, row by row from the
+/// bottom, each row from the left.
+///
 /// Narrower: a grain that reaches more than 1 % d beyond a new wall is outside. `error` throws;
 /// `push` sets it against the wall, its velocity kept, and throws if it then overlaps another grain
 /// by more than 1 % d; `remove` deletes it. The fluid's mass becomes old - rho0 (swept volume -
-/// volume of removed grains) to half a particle: outermost particles go first, ties by id; what is
-/// left outside is drawn to dx/2 inside. Under a free surface all fluid outside goes, and none is
-/// drawn.
-/// Both: fluid that stays keeps velocity, volume and pressure; where the moved walls change its
+/// volume of grains swept) to half a particle, the grains' volume as the porosity counts it:
+/// outermost particles go first, ties by id; what is left outside is drawn to dx/2 inside. Under a
+/// free surface all fluid outside goes, and none is drawn.
+///
+/// Both: fluid that stays keeps velocity, volume and pressure; where the change gives it another
 /// porosity, m and rhob follow it. Contacts with a moved wall and those of pushed or removed grains
 /// are deleted.
+///
 /// Throws ModelError; `state` is then unchanged.
 template <int D, class P>
 GeometryReport change_width(const Scenario& before, double new_width, const ChangeOptions& options,

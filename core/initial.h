@@ -9,16 +9,20 @@
 
 namespace varve::core {
 
-/// State at step 0 of a resolved scenario. Fluid: a lattice at ((i + 1/2) dx, (j + 1/2) dx) from
-/// the lower left corner up to fluid.level, ids row by row from the bottom, at rest, also inside
-/// grains (the method is unresolved). With eps from the grains, m = eps rho dx^D and rhob = eps
-/// rho, so that every particle stands for dx^D; rho is rho0 in the excess-pressure form and the
-/// density at rest with full pressure. fluid.jitter shifts each coordinate by up to that part of
-/// dx, drawn from (fluid.seed, id). Grains: rows x columns, pitch d (1 + gap), centred at
-/// grains.centre_x, the lowest row at grains.lowest_y, ids row by row from the bottom, jittered
-/// likewise by parts of d. Spin is 0, and there only with contact.rotation. No contacts; the clock
-/// at zero with time.dt. Throws ModelError if the domain is not a whole number of spacings wide,
-/// and std::logic_error for a scenario that is not resolved.
+/// State at step 0 of a resolved scenario.
+///
+/// Fluid: a lattice at ((i + 1/2) dx, (j + 1/2) dx) from the lower left corner up to fluid.level,
+/// ids row by row from the bottom, at rest, also inside grains (the method is unresolved). With eps
+/// from the grains, m = eps rho dx^D and rhob = eps rho, so that every particle stands for dx^D;
+/// rho is rho0 in the excess-pressure form and the density at rest with full pressure. fluid.jitter
+/// shifts each coordinate by up to that part of dx, drawn from (fluid.seed, id).
+///
+/// Grains: rows x columns, pitch d (1 + gap), centred at grains.centre_x, the lowest row at
+/// grains.lowest_y, ids row by row from the bottom, jittered likewise by parts of d. Spin is 0, and
+/// there only with contact.rotation. No contacts; the clock at zero with time.dt.
+///
+/// Throws ModelError if the domain is not a whole number of spacings wide, and std::logic_error for
+/// a scenario that is not resolved.
 template <int D, class P>
 State<D, P> first_state(const Scenario& resolved);
 
