@@ -1,5 +1,5 @@
-// The engine itself, for one dimension and one precision. advance() reads like the method section of
-// a paper; core/PHYSICS.md is that section.
+// The engine itself, for one dimension and one precision. advance() reads like the method section
+// of a paper; core/PHYSICS.md is that section.
 #pragma once
 
 #include <memory>
@@ -15,6 +15,7 @@
 #include "core/geometry_change.h"
 #include "core/pair_sweeps.h"
 #include "core/simulation.h"
+#include "core/stage_digests.h"
 #include "core/state.h"
 #include "core/walls.h"
 #include "core/workers.h"
@@ -52,8 +53,8 @@ class Engine final : public Simulation {
   void skip_scheduled();
 
  private:
-  /// Derived arrays, rebuilt by the same code at every step. Fluid arrays have one entry per particle,
-  /// dummy arrays one more than there are dummies: a padding point that weighs nothing.
+  /// Derived arrays, rebuilt by the same code at every step. Fluid arrays have one entry per
+  /// particle, dummy arrays one more than there are dummies: a padding point that weighs nothing.
   struct Work {
     std::vector<Real> porosity, floored_porosity, volume_before, density_before, volume, pressure;
     std::vector<Vec<Real, D>> stress_force;
@@ -67,6 +68,7 @@ class Engine final : public Simulation {
 
   void build_fields();
   void build_tables();
+  void build_grain_tables();
   void check_counts(const State<D, P>& state) const;
   void refresh_spans();
   void adopt_scenario();  // constants, walls and lists from scenario_
@@ -88,7 +90,10 @@ class Engine final : public Simulation {
   void check_grains() const;
   void commit();
   void record_tables();
+  void record_grain_tables();
 
+  void digest_stage(Stage stage);
+  void digest_neighbours();
   std::size_t move_fluid_part(std::size_t begin, std::size_t end);
   bool fluid_is_good(std::size_t a) const;
   [[noreturn]] void report_fluid(std::size_t a) const;
@@ -114,9 +119,12 @@ class Engine final : public Simulation {
   std::vector<WallPlane> planes_;
   RunOptions options_;
 
+  StageDigests stage_digests_;
+
   std::vector<FieldInfo> fields_;
   std::vector<FieldSpan> spans_;
   std::vector<TableInfo> tables_;
+  bool has_stage_table_ = false;
   std::vector<std::vector<std::vector<std::byte>>> table_bytes_;
   std::vector<std::uint64_t> table_rows_;
   std::vector<std::uint64_t> step_numbers_;  // clock as recorded: step, n_s

@@ -171,7 +171,19 @@ void Engine<D, P>::check_counts(const State<D, P>& state) const {
 
 template <int D, class P>
 void Engine<D, P>::build_tables() {
-  if (!scenario_.has_grains()) return;
+  if (scenario_.has_grains()) build_grain_tables();
+  has_stage_table_ = scenario_.record.stage_digests;
+  if (has_stage_table_)
+    tables_.push_back({"stages",
+                       {{"stage", FieldType::u8, ""},
+                        {"digest_high", FieldType::u64, ""},
+                        {"digest_low", FieldType::u64, ""}}});
+  table_rows_.assign(tables_.size(), 0);
+  for (const TableInfo& table : tables_) table_bytes_.emplace_back(table.columns.size());
+}
+
+template <int D, class P>
+void Engine<D, P>::build_grain_tables() {
   TableInfo contacts{"contacts",
                      {{"grain", FieldType::u64, ""},
                       {"kind", FieldType::u8, ""},
@@ -192,8 +204,6 @@ void Engine<D, P>::build_tables() {
     tables_.push_back({"work",
                        {{"drag_on_grains", FieldType::f64, "J"},
                         {"hydrodynamic_on_grains", FieldType::f64, "J"}}});
-  table_rows_.assign(tables_.size(), 0);
-  for (const TableInfo& table : tables_) table_bytes_.emplace_back(table.columns.size());
 }
 
 template <int D, class P>
@@ -206,9 +216,22 @@ TableSpan Engine<D, P>::table(std::size_t index) const {
 template <int D, class P>
 void Engine<D, P>::record_tables() {
   using engine_detail::append;
-  if (tables_.empty()) return;
   for (auto& table : table_bytes_)
     for (auto& column : table) column.clear();
+  if (scenario_.has_grains()) record_grain_tables();
+  if (!has_stage_table_) return;
+  auto& stages = table_bytes_.back();
+  table_rows_.back() = stage_digests_.digests().size();
+  for (const StageDigest& digest : stage_digests_.digests()) {
+    append(stages[0], static_cast<std::uint8_t>(digest.stage));
+    append(stages[1], digest.high);
+    append(stages[2], digest.low);
+  }
+}
+
+template <int D, class P>
+void Engine<D, P>::record_grain_tables() {
+  using engine_detail::append;
   auto& columns = table_bytes_[0];
   const auto& records = contacts_.records();
   table_rows_[0] = c_.frozen ? 0 : records.size();
@@ -227,7 +250,7 @@ void Engine<D, P>::record_tables() {
                                record.tangential_loss, record.friction_loss})
       append(columns[k++], value);
   }
-  if (tables_.size() < 2) return;
+  if (!c_.coupled) return;
   table_rows_[1] = 1;
   append(table_bytes_[1][0], drag_work_);
   append(table_bytes_[1][1], hydrodynamic_work_);

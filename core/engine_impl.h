@@ -1,4 +1,5 @@
-// All of Engine's bodies, for the source files that instantiate it (one per dimension and precision).
+// All of Engine's bodies, for the source files that instantiate it (one per dimension and
+// precision).
 #pragma once
 
 #include "core/engine.h"
@@ -11,3 +12,4 @@
 #include "core/engine_change_impl.h"
 #include "core/engine_fields_impl.h"
 #include "core/engine_report_impl.h"
+#include "core/engine_stages_impl.h"

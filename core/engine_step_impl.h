@@ -26,6 +26,19 @@ inline constexpr double skin_ratio = 0.25;
 
 inline constexpr std::size_t nobody = std::numeric_limits<std::size_t>::max();
 
+/// Throws where one of the numbers is not finite.
+template <int N, class Numbers>
+void require_finite(const Numbers& numbers, const char* field, std::uint64_t step,
+                    std::uint64_t id) {
+  for (int k = 0; k < N; ++k) {
+    const auto value = static_cast<double>(numbers[k]);
+    if (std::isfinite(value)) continue;
+    throw NumericalFailure("not a finite number", step, field, id, value,
+                           std::numeric_limits<double>::max(),
+                           "lower time.cfl or time.dt; look at the steps before");
+  }
+}
+
 }  // namespace engine_detail
 
 /// Semi-implicit Euler in two sweeps: superficial density from x(n), v(n); then pressure from it, all
@@ -33,8 +46,10 @@ inline constexpr std::size_t nobody = std::numeric_limits<std::size_t>::max();
 template <int D, class P>
 void Engine<D, P>::advance() {
   happenings_.clear();
+  stage_digests_.begin();
   if (scenario_.has_fluid()) {
     update_lists();
+    digest_stage(Stage::neighbours);
     if (c_.two_way) find_porosity();
     prepare_fluid();
     find_density_and_pressure();
@@ -78,6 +93,7 @@ void Engine<D, P>::find_porosity() {
   const double dummy_volume = integer_power<D>(c_.spacing);
   coupling_.porosity(c_, state_, work_.volume_before, work_.coupling_wall_position, dummy_volume,
                      work_.porosity, work_.floored_porosity, workers_);
+  digest_stage(Stage::porosity);
   counters_.porosity_clamps += coupling_.fluid_clamps();
   count_pass(engine_detail::pass_porosity);
 }
@@ -143,6 +159,7 @@ void Engine<D, P>::find_density_and_pressure() {
                [&](std::size_t begin, std::size_t end, unsigned) {
                  sweeps_.density(data, begin, end);
                });
+  digest_stage(Stage::pressure);
   count_pass(engine_detail::pass_density);
 }
 
@@ -153,6 +170,7 @@ void Engine<D, P>::find_wall_values() {
                [&](std::size_t begin, std::size_t end, unsigned) {
                  sweeps_.extrapolate(data, begin, end);
                });
+  digest_stage(Stage::walls);
   count_pass(engine_detail::pass_walls);
 }
 
@@ -163,6 +181,7 @@ void Engine<D, P>::find_stresses() {
                [&](std::size_t begin, std::size_t end, unsigned) {
                  sweeps_.stress(data, begin, end);
                });
+  digest_stage(Stage::stress);
   count_pass(engine_detail::pass_stress);
 }
 
@@ -173,6 +192,7 @@ void Engine<D, P>::find_grain_forces() {
   coupling_.forces(c_, state_, fluid, drag_law_, workers_);
   counters_.drag_porosity_clamps += coupling_.grain_clamps();
   counters_.weak_coupling += coupling_.weak_grains();
+  digest_stage(Stage::coupling);
   count_pass(engine_detail::pass_grain_forces);
 }
 
@@ -200,6 +220,7 @@ void Engine<D, P>::move_grains() {
     sum_work();
   }
   for (auto& x : next_.grains.position) wrap(x);
+  digest_stage(Stage::contacts);
   check_grains();
 }
 
@@ -247,16 +268,21 @@ void Engine<D, P>::check_grains() const {
   const double limit = scenario_.has_fluid()
                            ? scenario_.guards.speed * c_.sound_speed
                            : c_.diameter * static_cast<double>(c_.substeps) / c_.dt;
+  const std::uint64_t step = state_.clock.step + 1;
   for (std::size_t i = 0; i < next_.grains.size(); ++i) {
-    double speed2 = 0, place = 0;
+    const GrainState<D, P>& grains = next_.grains;
+    const std::uint64_t id = grains.id[i];
+    engine_detail::require_finite<D>(grains.velocity[i], "grains.velocity", step, id);
+    if (c_.rotation)
+      engine_detail::require_finite<spin_components<D>>(grains.spin[i], "grains.spin", step, id);
+    engine_detail::require_finite<D>(grains.position[i], "grains.position", step, id);
+    double speed2 = 0;
     for (int k = 0; k < D; ++k) {
-      const auto v = static_cast<double>(next_.grains.velocity[i][k]);
+      const auto v = static_cast<double>(grains.velocity[i][k]);
       speed2 += v * v;
-      place += static_cast<double>(next_.grains.position[i][k]);
     }
-    if (speed2 <= limit * limit && std::isfinite(place)) continue;
-    throw NumericalFailure("grain speed", state_.clock.step + 1, "grains.velocity",
-                           next_.grains.id[i], std::sqrt(speed2), limit,
+    if (speed2 <= limit * limit) continue;
+    throw NumericalFailure("grain speed", step, "grains.velocity", id, std::sqrt(speed2), limit,
                            "lower time.dt or contact.stiffness, or raise fluid.sound_speed");
   }
 }
@@ -289,6 +315,7 @@ void Engine<D, P>::move_fluid() {
   workers_.run(state_.fluid.size(), 64, [&](std::size_t begin, std::size_t end, unsigned thread) {
     bad[thread] = move_fluid_part(begin, end);
   });
+  digest_stage(Stage::integration);
   count_pass(engine_detail::pass_fluid);
   if (c_.two_way) count_pass(engine_detail::pass_reaction);
   const std::size_t first = *std::min_element(bad.begin(), bad.end());
@@ -312,14 +339,15 @@ double Engine<D, P>::beyond_walls(const Vec<Position, D>& x) const {
 
 template <int D, class P>
 bool Engine<D, P>::fluid_is_good(std::size_t a) const {
-  double speed2 = 0;
+  double speed2 = 0, place = 0;
   for (int k = 0; k < D; ++k) {
     const auto v = static_cast<double>(next_.fluid.velocity[a][k]);
     speed2 += v * v;
+    place += static_cast<double>(next_.fluid.position[a][k]);
   }
   const double limit = scenario_.guards.speed * c_.sound_speed;
   // Written so that a NaN fails too.
-  return speed2 <= limit * limit &&
+  return speed2 <= limit * limit && std::isfinite(place) &&
          std::abs(density_deviation(a)) <= scenario_.guards.density_deviation &&
          !(beyond_walls(next_.fluid.position[a]) > c_.spacing);
 }
@@ -327,6 +355,10 @@ bool Engine<D, P>::fluid_is_good(std::size_t a) const {
 template <int D, class P>
 void Engine<D, P>::report_fluid(std::size_t a) const {
   const std::uint64_t step = state_.clock.step + 1, id = state_.fluid.id[a];
+  engine_detail::require_finite<1>(&next_.fluid.superficial_density[a], "fluid.superficial_density",
+                                   step, id);
+  engine_detail::require_finite<D>(next_.fluid.velocity[a], "fluid.velocity", step, id);
+  engine_detail::require_finite<D>(next_.fluid.position[a], "fluid.position", step, id);
   const double deviation = density_deviation(a);
   if (!(std::abs(deviation) <= scenario_.guards.density_deviation))
     throw NumericalFailure("density deviation", step, "fluid.superficial_density", id, deviation,

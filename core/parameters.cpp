@@ -214,6 +214,8 @@ void add_coupling(std::vector<Parameter>& table) {
             "states of every k-th step; digests of all"));
   add(whole("record.keyframe_steps", {1, 1e6}, Change::outputs, VARVE_WHOLE(record.keyframe_steps),
             "a complete state at least this often"));
+  add(flag("record.stage_digests", Change::outputs, VARVE_FLAG(record.stage_digests),
+           "record a digest of every stage of every step, to locate a difference inside a step"));
 }
 
 #undef VARVE_MEMBER

@@ -104,6 +104,7 @@ struct Record {
   RecordTier tier = RecordTier::deltas;
   std::int64_t every = 1;
   std::int64_t keyframe_steps = 256;
+  bool stage_digests = false;  // a digest of every stage of every step, as an event table
 };
 
 /// A change of fork-changeable keys at the end of a given step of the run. Either `at` or `at_step`
