@@ -322,7 +322,7 @@ TEST(Narrower, WithAnAnchorSweepsOneSide) {
   EXPECT_EQ(state.fluid.size(), 17u * 30);
 }
 
-/// The box stirred: particles displaced by up to 0.4 dx, so that columns no longer end at the walls.
+/// The box stirred: particles displaced by up to 0.4 dx, so that columns do not end at the walls.
 DoubleState stirred(const Scenario& s) {
   Scenario jittered = s;
   jittered.fluid.jitter = 0.4;
@@ -362,7 +362,7 @@ TEST(Narrower, RemovesByMassOutermostFirst) {
 TEST(Narrower, BreaksTiesById) {
   const Scenario s = resolved(scenes::box());
   DoubleState state = first(s);
-  // One particle heavier by 20 particles: fewer of the others go, the lowest ids of the last column.
+  // One particle heavier by 20 particles: fewer of the others go, the lowest ids of a column first.
   state.fluid.mass[0] *= 21;
   widen(s, 0.017, state, {OutsideMode::error, 1});
   // Columns 0 and 1 whole and column 2 up to the balance: 90 - 20 are to go.
