@@ -130,6 +130,8 @@ void FrameReader::take_tables(const StepMessage& message) {
     frame_.rows[i] = rows;
     if (!message.tables.empty()) {
       const TableBlob& blob = message.tables[i];
+      check_ratio(rows * row_bytes(table), blob.stored, "table '" + table.name + "'",
+                  source_.limits());
       plain_.resize(rows * row_bytes(table));
       unpack(blob.packing, std::span(body_).subspan(from, blob.stored), plain_,
              "table '" + table.name + "'", source_.limits());

@@ -15,8 +15,8 @@ class FrameReader {
   FrameReader(RecordSource& source, const Schema& schema, std::uint64_t particles_max);
 
   /// The state of a record that stores one, which must be a keyframe or follow the record decoded
-  /// before. False where its bytes do not hold (`problem()`). Throws LogError (damaged, limit) where
-  /// they hold and yet make no sense, or where the state's digest is not the recorded one.
+  /// before. False where its bytes do not hold (`problem()`). Throws LogError (damaged, limit)
+  /// where they hold and yet make no sense, or where the state's digest is not the recorded one.
   bool read(const Record& record, const StepMessage& message);
   /// Only the tables; `frame()` then has no fields.
   bool read_tables(const Record& record, const StepMessage& message);

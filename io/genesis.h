@@ -26,7 +26,8 @@ struct Lineage {
   std::uint64_t step = 0;      ///< K
   Digest parent_digest;        ///< digest[K] in the parent, before the change
   Digest parent_chain;         ///< chain[K] in the parent
-  Digest chain_base;           ///< chain[K-1] in the parent, its own chain base where K is its first step
+  /// chain[K-1] in the parent; the parent's own chain base where K is its first step.
+  Digest chain_base;
   struct Change {
     std::string key, from, to;
     bool operator==(const Change&) const = default;

@@ -10,7 +10,7 @@ struct Limits {
   std::uint64_t message_bytes_max = std::uint64_t{64} << 20;  ///< one message, uncompressed
   std::uint64_t body_bytes_max = std::uint64_t{1} << 30;      ///< one record's blobs, as stored
   std::uint64_t field_bytes_max = std::uint64_t{1} << 30;     ///< one field or table, uncompressed
-  std::uint64_t ratio_max = 10000;                   ///< uncompressed / stored, above ratio_free_bytes
+  std::uint64_t ratio_max = 10000;  ///< uncompressed / stored, above ratio_free_bytes
   std::uint64_t ratio_free_bytes = std::uint64_t{1} << 20;
   std::uint64_t particles_max = std::uint64_t{1} << 28;  ///< per field; genesis declares its own
   std::uint64_t rows_max = std::uint64_t{1} << 26;       ///< per table and step

@@ -46,9 +46,9 @@ class LogAppender {
   /// For a new, empty file.
   LogAppender(File& file, const LogId& id, const Limits& limits);
 
-  /// Continues a log: walks all of `file`, checks every byte, and stands behind the last whole step.
-  /// Throws LogError(damaged) for rot. `cut_bytes()` is then what lies behind: the torn tail, which
-  /// the caller cuts.
+  /// Continues a log: walks all of `file`, checks every byte, and stands behind the last whole
+  /// step. Throws LogError(damaged) for rot. `cut_bytes()` is then what lies behind: the torn tail,
+  /// which the caller cuts.
   static LogAppender continuing(File& file, const LogId& id, const Limits& limits);
 
   void genesis(const Genesis& genesis, std::uint64_t particles_max);

@@ -102,7 +102,8 @@ std::optional<StepEntry> IndexLookup::keyframe_at_or_before(std::uint64_t step) 
   if (!node || node->message.first_step > step) return std::nullopt;
   for (;;) {
     const IndexMessage& message = node->message;
-    for (std::uint64_t at = std::min(step, message.last_step()) + 1; at > message.first_step; --at) {
+    const std::uint64_t from = std::min(step, message.last_step()) + 1;
+    for (std::uint64_t at = from; at > message.first_step; --at) {
       if (message.states[at - 1 - message.first_step] == StoredState::keyframe) {
         return node->entry(at - 1);
       }
@@ -119,7 +120,8 @@ std::optional<std::uint64_t> IndexLookup::stored_at_or_before(std::uint64_t step
   for (; node; node = previous(*node)) {
     const IndexMessage& message = node->message;
     if (message.first_step > step) continue;
-    for (std::uint64_t at = std::min(step, message.last_step()) + 1; at > message.first_step; --at) {
+    const std::uint64_t from = std::min(step, message.last_step()) + 1;
+    for (std::uint64_t at = from; at > message.first_step; --at) {
       if (message.states[at - 1 - message.first_step] != StoredState::none) return at - 1;
     }
   }

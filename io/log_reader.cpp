@@ -165,7 +165,8 @@ void LogReaderImpl::absorb(const Record& record) const {
   }
 }
 
-// Takes over what follows `end_`. False where that shows damage and the log must be scanned instead.
+// Takes over what follows `end_`. False where that shows damage and the log must be scanned
+// instead.
 bool LogReaderImpl::walk_on() const {
   loose_events_.clear();
   RecordWalk walk(source_, end_, next_sequence_, file_end_, Check::body);

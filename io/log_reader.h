@@ -70,15 +70,17 @@ class LogReader {
   virtual std::optional<StepHeader> header(std::uint64_t step) const = 0;
   /// Nearest step <= `step` whose state is stored, from which re-execution can start.
   virtual std::optional<std::uint64_t> stored_step_at_or_before(std::uint64_t step) const = 0;
-  /// The state of a step, tables included. Nothing where its state is not stored (tier digests, every k) or lost.
-  /// Throws LogError(damaged) where the decoded state's digest is not the recorded one.
+  /// The state of a step, tables included. Nothing where its state is not stored (tier digests,
+  /// every k) or lost. Throws LogError(damaged) where the decoded state's digest is not the
+  /// recorded one.
   virtual std::optional<Frame> frame(std::uint64_t step) const = 0;
   /// Tables recorded at a step (empty tables where none were).
   virtual std::optional<Frame> tables(std::uint64_t step) const = 0;
   /// Calls `visit` for every held step in [from, to] in order, states decoded one after the other
   /// (`frame` is null where no state is stored). Stops when `visit` returns false.
-  virtual void for_each(std::uint64_t from, std::uint64_t to,
-                        const std::function<bool(const StepHeader&, const Frame*)>& visit) const = 0;
+  virtual void for_each(
+      std::uint64_t from, std::uint64_t to,
+      const std::function<bool(const StepHeader&, const Frame*)>& visit) const = 0;
   /// The same without decoding any state.
   virtual void for_each_header(std::uint64_t from, std::uint64_t to,
                                const std::function<bool(const StepHeader&)>& visit) const = 0;

@@ -120,9 +120,8 @@ class LogWriterImpl final : public LogWriter {
     const std::size_t bytes = std::max<std::size_t>(state_bytes(frame), 1);
     const auto fitting =
         static_cast<std::uint32_t>(std::min<std::uint64_t>(options_.queue_bytes / bytes, 1 << 20));
-    const std::uint32_t count =
-        std::max(std::min(options_.queue_slots, fitting), std::min(options_.queue_slots, slots_min));
-    slots_.resize(std::max<std::uint32_t>(count, 1));
+    const std::uint32_t most = std::max<std::uint32_t>(options_.queue_slots, 1);
+    slots_.resize(std::clamp(fitting, std::min(slots_min, most), most));
     for (Slot& slot : slots_) slot.reserve(bytes);
     thread_ = std::thread([this] { run(); });
   }

@@ -98,7 +98,8 @@ class MemoryFileSystem::MemoryFile final : public File {
     if (node_->bytes.size() < offset + put) node_->bytes.resize(offset + put);
     std::copy_n(bytes.begin(), put, node_->bytes.begin() + static_cast<std::ptrdiff_t>(offset));
     if (hit != FaultKind::none) {
-      fail(path_, fmt::format("writing {} bytes: {} written, 0 bytes free", bytes.size(), put), hit);
+      fail(path_, fmt::format("writing {} bytes: {} written, 0 bytes free", bytes.size(), put),
+           hit);
     }
   }
 

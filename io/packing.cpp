@@ -71,7 +71,8 @@ void unpack(Packing packing, std::span<const std::byte> stored, std::span<std::b
             const std::string& what, const Limits& limits) {
   if (packing == Packing::plain) {
     if (stored.size() != out.size()) {
-      damaged(what, fmt::format("{} bytes stored where {} are declared", stored.size(), out.size()));
+      damaged(what,
+              fmt::format("{} bytes stored where {} are declared", stored.size(), out.size()));
     }
     if (!out.empty()) std::memcpy(out.data(), stored.data(), out.size());
     return;

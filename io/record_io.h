@@ -179,8 +179,8 @@ class RecordAppender {
   Bytes packed_;
 };
 
-/// Reads the genesis record at the start of `file` and binds `source` to its log id. Throws LogError:
-/// not_a_log, unsupported, damaged, limit.
+/// Reads the genesis record at the start of `file` and binds `source` to its log id. Throws
+/// LogError: not_a_log, unsupported, damaged, limit.
 GenesisMessage read_genesis(RecordSource& source, std::uint64_t* record_end = nullptr);
 
 /// Throws `error` again with the path and, where it has none, the offset.

@@ -1,5 +1,5 @@
-// Turns a frame into a step's record: digest, chain, what is stored at this step and how. Private to
-// io; runs on the writer thread.
+// Turns a frame into a step's record: digest, chain, what is stored at this step and how. Private
+// to io; runs on the writer thread.
 #pragma once
 
 #include <memory>

@@ -62,7 +62,7 @@ Attempt attempt(MemoryFileSystem& files, const ToyOptions& options) {
     out.what = error.what();
     out.kind = error.kind();
     if (writer) {
-      // Latched: the same failure at every further call, nothing is tried again as if all were well.
+      // Latched: the same failure at every further call; nothing is retried as if all were well.
       run.advance();
       EXPECT_THROW(writer->append(run.frame().view(), {}), LogError);
       EXPECT_THROW(writer->flush(), LogError);

@@ -151,7 +151,8 @@ TEST_F(LogRoundTrip, ForEachVisitsEveryStepOnceInOrder) {
   options.every = 2;
   const auto reader = record(options);
   const auto frames = toy_frames(options);
-  for (const auto& [from, to] : {std::pair<std::uint64_t, std::uint64_t>{0, 60}, {17, 43}, {50, 99}}) {
+  using Range = std::pair<std::uint64_t, std::uint64_t>;
+  for (const auto& [from, to] : {Range{0, 60}, Range{17, 43}, Range{50, 99}}) {
     std::uint64_t next = from;
     reader->for_each(from, to, [&](const io::StepHeader& header, const io::Frame* frame) {
       EXPECT_EQ(header.step, next++);
