@@ -57,14 +57,14 @@ void schedule_ramp(core::Scenario& child, std::uint64_t step, double width, doub
   const double steps = ramp_time / child.time.dt;
   if (steps < static_cast<double>(jumps))
     throw UsageError(fmt::format(
-        "--ramp-time: {} s are {:.6g} steps, and the change of width takes {} jumps of one spacing; "
-        "at least {} s are needed",
+        "--ramp-time: {} s are {:.6g} steps, and the change of width takes {} jumps of one "
+        "spacing; at least {} s are needed",
         core::number_text(ramp_time), steps, jumps,
         core::number_above(static_cast<double>(jumps) * child.time.dt)));
   for (std::int64_t i = 1; i <= jumps; ++i) {
     const double share = static_cast<double>(i) / static_cast<double>(jumps);
-    const double reached = i == jumps ? width
-                                      : from + (width > from ? 1 : -1) * static_cast<double>(i) * jump;
+    const double moved = (width > from ? 1 : -1) * static_cast<double>(i) * jump;
+    const double reached = i == jumps ? width : from + moved;
     core::ScheduledChange change;
     change.name = free_name(child, static_cast<int>(i));
     change.at_step = static_cast<std::int64_t>(step) +
@@ -118,6 +118,16 @@ std::uint64_t perturb_grains(const io::Schema& schema, io::Frame& frame, double 
              : shift_field<double>(bytes, field.components, ids, amplitude, seed);
 }
 
+/// Whether the scenario's own end is the last step that the parent holds.
+bool ends_where_meant(const core::Scenario& scenario, const io::LogReader& parent) {
+  const Target target = target_of(scenario);
+  const std::uint64_t last = parent.last_step();
+  if (last == parent.first_step()) return false;
+  const auto before = parent.header(last - 1), end = parent.header(last);
+  return before && end && !target.reached(last - 1, before->time) &&
+         target.reached(last, end->time);
+}
+
 /// Length of the child's run, as keys of its scenario.
 void set_target(core::Scenario& child, const io::LogReader& parent, const BranchRequest& request,
                 bool dt_changed) {
@@ -133,6 +143,8 @@ void set_target(core::Scenario& child, const io::LogReader& parent, const Branch
     return;
   } else if (dt_changed) {
     target.until = parent.header(parent.last_step())->time;
+  } else if (ends_where_meant(child, parent)) {
+    return;  // the parent's own length says it
   } else {
     target.last_step = parent.last_step();
   }
@@ -233,8 +245,8 @@ Branch make_branch(const io::LogReader& parent, const BranchRequest& request,
                               {"grains_moved", std::to_string(moved)}}});
     changes.push_back({"fork.perturb", "0", amplitude + " seed " + seed});
     if (moved == 0)
-      branch.notes.push_back("warning: --perturb is below the resolution of the positions: no grain "
-                             "moved");
+      branch.notes.push_back("warning: --perturb is below the resolution of the positions: no "
+                             "grain moved");
   }
   // What the parent recorded of step K itself happened before the change.
   if (auto tables = parent.tables(request.step)) {

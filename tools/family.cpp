@@ -74,8 +74,9 @@ std::unique_ptr<io::LogReader> open_parent(const io::LogReader& child,
     const std::string id = named->genesis().run_id();
     if (std::find(ancestors.begin(), ancestors.end(), id) == ancestors.end() ||
         id == lineage->parent_run_id)
-      throw UsageError(fmt::format("{}: not the parent of {}: run {} with step {} is", *parent_option,
-                                   child.path(), lineage->parent_run_id, lineage->step));
+      throw UsageError(fmt::format("{}: not the parent of {}: run {} with step {} is",
+                                   *parent_option, child.path(), lineage->parent_run_id,
+                                   lineage->step));
   }
   if (parent_option && fs::is_directory(*parent_option))
     if (auto found = find_in(*parent_option, *lineage, child.path())) return found;
@@ -130,8 +131,8 @@ Place open_at(std::unique_ptr<io::LogReader> run, const std::string& text,
 
 void warn_if_incomplete(const io::LogReader& log) {
   if (log.completeness() == io::Completeness::torn)
-    warn(fmt::format("{}: torn: {} bytes behind step {} are no whole record (varve resume cuts them)",
-                     log.path(), log.torn_bytes(), log.last_step()));
+    warn(fmt::format("{}: torn: {} bytes behind step {} are no whole record (varve resume cuts "
+                     "them)", log.path(), log.torn_bytes(), log.last_step()));
   if (log.completeness() == io::Completeness::damaged)
     warn(fmt::format("{}: damaged: varve verify says where, varve recover saves what is whole",
                      log.path()));

@@ -17,8 +17,8 @@ std::vector<std::string> logs_in(const std::string& folder);
 /// The parent of a fork: first `parent_option` (a file, or a folder to search) if given, then the
 /// file named in the lineage beside the child, then every log beside it whose run id is the
 /// parent's and which holds the step of the fork with the recorded chain. nullptr where `child` is
-/// no fork or no such log is found. Throws UsageError where `parent_option` is another run, LogError
-/// where it can't be read.
+/// no fork or no such log is found. Throws UsageError where `parent_option` is another run,
+/// LogError where it can't be read.
 std::unique_ptr<io::LogReader> open_parent(const io::LogReader& child,
                                            const std::optional<std::string>& parent_option = {});
 

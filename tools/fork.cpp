@@ -71,18 +71,20 @@ double perturbation(const Invocation& invocation, double diameter) {
         "(grain diameters)", text));
   const double amplitude = quantity->value * (relative ? diameter : 1.0);
   if (amplitude > 0.01 * diameter)
-    throw UsageError(fmt::format("--perturb: {} m is more than a hundredth of a grain; largest safe "
-                                 "value {} m",
-                                 core::number_text(amplitude), core::number_below(0.01 * diameter)));
+    throw UsageError(fmt::format("--perturb: {} m is more than a hundredth of a grain; largest "
+                                 "safe value {} m", core::number_text(amplitude),
+                                 core::number_below(0.01 * diameter)));
   return amplitude;
 }
 
 std::string default_output(const std::string& parent, std::uint64_t step) {
   const fs::path path(parent);
-  return (path.parent_path() / fmt::format("{}.fork-{}.varve", path.stem().string(), step)).string();
+  const std::string name = fmt::format("{}.fork-{}.varve", path.stem().string(), step);
+  return (path.parent_path() / name).string();
 }
 
-/// Copies the parent's log, as far as it is whole now, beside the child, where it is found by its id.
+/// Copies the parent's log, as far as it is whole now, beside the child, where it is found by its
+/// id.
 void copy_parent(const std::string& parent, const std::string& child, bool overwrite) {
   const fs::path source(parent), folder = fs::path(child).parent_path();
   std::error_code error;
@@ -153,7 +155,7 @@ int fork(const Invocation& invocation) {
   session.path = invocation.has("output") ? invocation.value("output")
                                           : default_output(parent->path(), request.step);
   session.target = target_of(branch.engine->simulation().scenario());
-  if (invocation.has("stop-after")) session.stop_after_s = duration_option(invocation, "stop-after");
+  session.stop_after_s = stop_after_option(invocation);
   session.first_events = branch.events;
   io::WriterOptions options;
   options.overwrite = invocation.has("overwrite");
@@ -188,7 +190,8 @@ Verb verb() {
       {"outside", "MODE", "grains left outside: error, push or remove", false, "error"},
       {"anchor", "SIDE", "wall that stays: left, right or none", false, "none"},
       {"ramp-time", "T", "reach the width over T, in jumps of one spacing", false, ""},
-      {"perturb", "AMP", "shift the grains by a draw of at most AMP (1e-6 d with --seed alone)", false, ""},
+      {"perturb", "AMP", "shift the grains by a draw of at most AMP (--seed alone: 1e-6 d)", false,
+       ""},
       {"seed", "S", "of --perturb", false, ""},
       steps_spec("so many steps beyond the fork"),
       until_spec(),
@@ -196,7 +199,7 @@ Verb verb() {
       threads_spec(),
       {"output,o", "RUN", "log to write [RUN.fork-STEP.varve]", false, ""},
       {"overwrite", "", "replace an existing log", false, ""},
-      {"parent", "PATH", "log or folder with RUN's own parent, if --at lies before RUN's start", false, ""},
+      {"parent", "PATH", "log or folder with RUN's parent, if --at lies before RUN", false, ""},
       {"detach", "", "copy the parent's log beside the child", false, ""},
   };
   verb.arguments_min = verb.arguments_max = 1;

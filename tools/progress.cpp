@@ -134,11 +134,16 @@ std::string Progress::bar(const ProgressPoint& point, double wall_s) const {
   const Rates r = rates(static_cast<double>(point.step - start_.step), total, wall_s);
   std::string text = title_ + " ";
   if (r.fraction) {
-    constexpr std::size_t width = 16;
+    constexpr std::size_t width = 10;
     const auto filled = static_cast<std::size_t>(*r.fraction * static_cast<double>(width));
-    text += fmt::format("[{:#<{}}{:.<{}}] ", "", filled, "", width - filled);
+    text += fmt::format("[{:#<{}}{:.<{}}] {:.1f}% ", "", filled, "", width - filled,
+                        100 * *r.fraction);
   }
-  text += line(point, wall_s);
+  text += fmt::format("{}", point.step);
+  if (total) text += fmt::format("/{:.0f}", static_cast<double>(start_.step) + *total);
+  text += fmt::format(" t={:.3g}s {:.3g} steps/s", point.time, r.steps_per_s);
+  if (point.log_bytes > 0) text += " " + human_bytes(point.log_bytes);
+  if (r.left_s) text += " ETA " + human_duration(*r.left_s);
   const std::size_t columns = terminal_columns();
   if (text.size() >= columns) text.resize(columns - 1);
   return text;

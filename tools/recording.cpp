@@ -119,7 +119,8 @@ std::optional<Mismatch> first_difference(const io::Schema& schema, const io::Fra
   found.time = computed.time;
   found.field = field->name;
   if (field->first) {
-    if (field->components > 1) found.component = io::component_name(*field, field->first->component);
+    if (field->components > 1)
+      found.component = io::component_name(*field, field->first->component);
     found.particle = io::particle_name(field->first->particle);
     found.recorded = value_text(field->first->a);
     found.computed = value_text(field->first->b);

@@ -1,5 +1,6 @@
 // What joins any engine to a log: recording its steps, going back to one of them, executing them
-// again and comparing. Knows io::Engine and the log only; an engine of any kind can be driven by it.
+// again and comparing. Knows io::Engine and the log only; an engine of any kind can be driven by
+// it.
 #pragma once
 
 #include <cstdint>

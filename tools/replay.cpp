@@ -41,8 +41,7 @@ std::optional<Mismatch> check_first_state(const io::LogReader& log,
 
 Json first_json(const Mismatch& first) {
   Json object{{"step", std::to_string(first.step)}, {"time_s", first.time}};
-  object["field"] = first.field.empty() ? Json() : Json(first.field);
-  if (first.component) object["component"] = *first.component;
+  object["field"] = first.field.empty() ? Json() : Json(first.component.value_or(first.field));
   object["particle"] = first.particle ? Json(*first.particle) : Json();
   if (first.row) object["row"] = std::to_string(*first.row);
   object["a"] = first.recorded;
@@ -77,7 +76,7 @@ void report(const Invocation& invocation, const io::LogReader& log, const Replay
   }
 }
 
-/// Writes the states of re-executed steps A..B into a log of their own, in which every step decodes.
+/// Writes the states of re-executed steps A..B into a log of their own: every step decodes there.
 class Emitter {
  public:
   Emitter(const io::LogReader& log, const Invocation& invocation, const core::RunOptions& options)
@@ -131,7 +130,8 @@ int replay_verb(const Invocation& invocation) {
   if (invocation.has("from")) from = parse_step(invocation.value("from"), *log);
   if (invocation.has("to")) to = parse_step(invocation.value("to"), *log);
   if (from > to)
-    throw UsageError(fmt::format("--from: step {} lies behind the last step to replay, {}", from, to));
+    throw UsageError(
+        fmt::format("--from: step {} lies behind the last step to replay, {}", from, to));
 
   ReplayResult result;
   const StopSignals signals;
@@ -162,9 +162,10 @@ Verb verb() {
   verb.usage = "RUN";
   verb.summary = "Executes recorded steps again and checks every state, event table and event.";
   verb.description =
-      "Starts from the nearest stored state at or before --from (the first step of the log by\n"
-      "default, whose state is made anew from the scenario and checked as well). Ends at the first\n"
-      "difference with exit 1, naming step, field and particle where the log stores the state.\n\n"
+      "Starts from the nearest stored state at or before --from (by default the first step of\n"
+      "the log, whose state is made anew from the scenario and checked as well). Ends at the\n"
+      "first difference with exit 1, naming step, field and particle where the log stores the\n"
+      "state.\n\n"
       "  varve replay column.varve --threads 4\n"
       "  varve replay column.varve --from t=0.2s --to 50%\n";
   verb.options = {
@@ -172,7 +173,7 @@ Verb verb() {
       {"to", "STEP", "last step to check", false, ""},
       threads_spec(),
       {"force", "", "also where the log is of another engine revision", false, ""},
-      {"emit", "A:B", "write the re-executed states of these steps to -o, every one stored", false, ""},
+      {"emit", "A:B", "write the re-executed states of these steps to -o, all stored", false, ""},
       {"output,o", "RUN", "log that --emit writes", false, ""},
       {"overwrite", "", "replace what -o names", false, ""},
   };

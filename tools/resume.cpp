@@ -33,7 +33,7 @@ int resume(const Invocation& invocation) {
   session.globals = invocation.globals;
   session.verb = "resume";
   session.path = path;
-  if (invocation.has("stop-after")) session.stop_after_s = duration_option(invocation, "stop-after");
+  session.stop_after_s = stop_after_option(invocation);
   session.target = target_option(invocation, last->step)
                        .value_or(target_of(scenario_of(log->genesis(), path)));
   if (!session.target.last_step && !session.target.until)
@@ -62,10 +62,11 @@ Verb verb() {
   Verb verb;
   verb.name = "resume";
   verb.usage = "RUN";
-  verb.summary = "Continues a run from its last whole record, to the same bits as if never stopped.";
+  verb.summary = "Continues a run from its last whole record, as if it had never stopped.";
   verb.description =
-      "Goes on to the end that the run was started with; --steps and --until go further. Bytes\n"
-      "behind the last whole record (a torn tail, after a crash) are cut, and this is said.\n\n"
+      "Goes on to the end that the run was started with; --steps and --until go further.\n"
+      "Bytes behind the last whole record (a torn tail, after a crash) are cut, and this is\n"
+      "said. The bits are those of a run that was never stopped.\n\n"
       "  varve resume column.varve\n"
       "  varve resume column.varve --steps 1000\n";
   verb.options = {steps_spec("so many more steps"), until_spec(), threads_spec(),

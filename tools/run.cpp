@@ -44,7 +44,7 @@ int run(const Invocation& invocation) {
                      ? invocation.value("output")
                      : std::filesystem::path(name).stem().string() + ".varve";
   session.target = no_step ? Target{0, {}} : target_of(source.scenario);
-  if (invocation.has("stop-after")) session.stop_after_s = duration_option(invocation, "stop-after");
+  session.stop_after_s = stop_after_option(invocation);
 
   const auto engine = SimulationEngine::fresh(source.scenario, run_options);
   io::Genesis genesis = make_genesis(source.scenario, engine->schema(), run_options.threads);
@@ -65,9 +65,9 @@ Verb verb() {
   verb.usage = "[FILE|PRESET]";
   verb.summary = "Simulates a scenario and records every step in a log.";
   verb.description =
-      "Without FILE it runs the preset single_disc. The first Ctrl-C (or SIGTERM) finishes the\n"
-      "step, closes the log and exits with 75; varve resume goes on to the same bits as a run that\n"
-      "was never stopped.\n\n"
+      "Without FILE it runs the preset single_disc. The first Ctrl-C (or SIGTERM) finishes\n"
+      "the step, closes the log and exits with 75; varve resume goes on to the same bits as a\n"
+      "run that was never stopped.\n\n"
       "  varve run column.cfg -o column.varve\n"
       "  varve run column.cfg -s contact.damping=0.25 -s 'domain.width=8 cm' --until '0.5 s'\n";
   verb.options = {

@@ -92,7 +92,8 @@ void print_counters(const core::Counters& counters, const Session& session) {
   };
   mention(counters.porosity_clamps, "times the porosity of a fluid particle was held at its floor");
   mention(counters.drag_porosity_clamps, "times the porosity in a drag law was held at its floor");
-  mention(counters.weak_coupling, "grain-steps with less than half the fluid in reach of the grain");
+  mention(counters.weak_coupling,
+          "grain-steps with less than half the fluid in reach of the grain");
 }
 
 void print_summary(const Session& session, const RecordingResult& result) {
@@ -161,6 +162,11 @@ double duration_option(const Invocation& invocation, const std::string& option) 
   return seconds;
 }
 
+std::optional<double> stop_after_option(const Invocation& invocation) {
+  if (!invocation.has("stop-after")) return std::nullopt;
+  return duration_option(invocation, "stop-after");
+}
+
 unsigned threads_option(const Invocation& invocation) {
   constexpr std::uint64_t threads_max = 1024;
   const auto threads = invocation.count("threads");
@@ -223,15 +229,16 @@ std::vector<std::string> event_lines(const std::vector<io::Event>& events) {
 }
 
 OptionSpec threads_spec() {
-  return {"threads", "N", "threads of the engine (0: one per core); never changes a bit", false, "1"};
+  return {"threads", "N", "threads of the engine (0: one per core); never changes a bit", false,
+          "1"};
 }
 OptionSpec steps_spec(const std::string& help) { return {"steps", "N", help, false, ""}; }
 OptionSpec until_spec() {
   return {"until", "T", "end at the first step with time >= T, e.g. '0.3 s'", false, ""};
 }
 OptionSpec stop_after_spec() {
-  return {"stop-after", "D", "stop after this much wall time, e.g. 90s, 10min, 1.5h (exit 75)", false,
-          ""};
+  return {"stop-after", "D", "stop after this much wall time, e.g. 90s, 10min, 1.5h (exit 75)",
+          false, ""};
 }
 
 }  // namespace varve::tools

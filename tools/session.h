@@ -24,13 +24,16 @@ struct Session {
   std::vector<io::Event> first_events;  ///< recorded with the log's first state, counted as added
 };
 
-/// Runs to the target, prints the summary (JSON on stdout with --json) and returns the exit code: 0,
-/// 5 after a numerical failure, 75 where it was stopped. The log is closed in every case.
+/// Runs to the target, prints the summary (JSON on stdout with --json) and returns the exit code:
+/// 0, 5 after a numerical failure, 75 where it was stopped. The log is closed in every case.
 int run_session(SimulationEngine& engine, std::unique_ptr<io::LogWriter> writer,
                 const Session& session);
 
 /// "90 s", "10min", "1.5h"; bare numbers are seconds. UsageError names the option otherwise.
 double duration_option(const Invocation& invocation, const std::string& option);
+
+/// --stop-after, where it is given.
+std::optional<double> stop_after_option(const Invocation& invocation);
 
 /// --threads: at least 1 (0: one per core of the machine).
 unsigned threads_option(const Invocation& invocation);

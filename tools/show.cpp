@@ -171,10 +171,11 @@ std::string range_line(const io::FieldDescriptor& field, const io::FieldView& vi
   io::Scalar low = io::scalar_at(field, view, 0), high = low;
   for (std::uint64_t i = 1; i < scalars; ++i) {
     const io::Scalar value = io::scalar_at(field, view, i);
-    const bool less = value.is_real() ? value.as_double() < low.as_double() : value.bits < low.bits;
-    const bool more = value.is_real() ? value.as_double() > high.as_double() : value.bits > high.bits;
-    if (less) low = value;
-    if (more) high = value;
+    const auto below = [](const io::Scalar& a, const io::Scalar& b) {
+      return a.is_real() ? a.as_double() < b.as_double() : a.bits < b.bits;
+    };
+    if (below(value, low)) low = value;
+    if (below(high, value)) high = value;
   }
   line += fmt::format("  {} .. {}", text_of(low, hex), text_of(high, hex));
   return line + (field.unit.empty() ? "" : " " + field.unit) + "\n";
@@ -235,17 +236,18 @@ Verb verb() {
   verb.usage = "RUN";
   verb.summary = "Shows the state at a step: ranges of every field, or every value of some.";
   verb.description =
-      "Steps whose state is not stored (tier digests, every k) are executed again from the nearest\n"
-      "one that is. Decimals are the shortest that read back to the same bits.\n\n"
+      "Steps whose state is not stored (tier digests, every k) are executed again from the\n"
+      "nearest one that is. Decimals are the shortest that read back to the same bits.\n\n"
       "  varve show column.varve --at t=0.3s\n"
       "  varve show column.varve --at last --particle grains:3 --hex\n"
       "  varve show column.varve --at 1200 --fields grains.position,grains.velocity --json\n";
   verb.options = {
       {"at", "STEP", "which: 12000, t=0.3s, 50%, first, last, last-100", false, "last"},
       {"particle", "ID", "only this one; grains:ID or fluid:ID where both have it", false, ""},
-      {"fields", "NAMES", "only these, comma between; a population's name stands for its fields", false, ""},
+      {"fields", "NAMES", "only these, comma between; a population stands for its fields", false,
+       ""},
       {"hex", "", "reals as hexadecimal floats", false, ""},
-      {"parent", "PATH", "log or folder with RUN's parent, if --at lies before RUN's start", false, ""},
+      {"parent", "PATH", "log or folder with RUN's parent, if --at lies before RUN", false, ""},
       threads_spec(),
   };
   verb.arguments_min = verb.arguments_max = 1;
