@@ -62,11 +62,7 @@ class Assessor {
     a_.step_set_by = binding.chosen == a_.dt ? std::string(binding.name) : "time.dt";
     a_.substeps = substeps(s_);
     if (grains_move(s_)) a_.contact_time = core::contact_time(s_);
-    if (s_.time.steps > 0) {
-      a_.steps = static_cast<std::uint64_t>(s_.time.steps);
-    } else if (!std::isnan(s_.time.until)) {
-      a_.steps = first_step_at(s_.time.until, s_.time.dt);
-    }
+    a_.steps = steps_of_run(s_);
   }
 
   void flow() {

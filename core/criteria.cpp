@@ -7,6 +7,7 @@
 #include "core/drag.h"
 #include "core/kernel.h"
 #include "core/math.h"
+#include "core/parameters.h"
 
 namespace varve::core {
 namespace {
@@ -66,7 +67,7 @@ double periodic_minimum(const Scenario& s) {
   double least = 0;
   if (s.has_fluid()) least = kernel_support(s) + list_skin_ratio * smoothing_length(s);
   if (s.is_coupled())
-    least = std::max(least, coupling_radius(s) + list_skin_ratio * s.coupling.length);
+    least = std::max(least, coupling_radius(s) + list_skin_ratio * smoothing_length(s));
   if (s.has_grains()) least = std::max(least, s.grains.diameter * (1 + list_skin_ratio));
   return 2 * least;
 }
@@ -210,6 +211,25 @@ std::uint64_t first_step_at(double seconds, double dt) {
   const double exact = seconds / dt - 1e-6;
   if (!(exact > 0)) return 0;
   return static_cast<std::uint64_t>(std::ceil(std::min(exact, 9e15)));
+}
+
+std::uint64_t steps_of_run(const Scenario& s) {
+  if (s.time.steps > 0) return static_cast<std::uint64_t>(s.time.steps);
+  if (std::isnan(s.time.until)) return 0;
+  std::uint64_t since_step = 0;
+  double since_time = 0;
+  Scenario now;
+  now.time.dt = s.time.dt;
+  for (const ScheduledChange& change : s.changes) {
+    const auto step = static_cast<std::uint64_t>(change.at_step);
+    const double time = since_time + static_cast<double>(step - since_step) * now.time.dt;
+    if (time >= s.time.until) break;
+    for (const auto& [key, value] : change.settings)
+      if (key == "time.dt") set_parameter(now, *find_parameter(key), value);
+    since_step = step;
+    since_time = time;
+  }
+  return since_step + first_step_at(s.time.until - since_time, now.time.dt);
 }
 
 Lattice fluid_lattice(const Scenario& s) {

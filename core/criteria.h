@@ -19,7 +19,8 @@ double kernel_support(const Scenario& scenario);
 /// [m] Rc = 2 hc: radius within which a grain and a fluid particle see each other. Needs
 /// coupling.length.
 double coupling_radius(const Scenario& scenario);
-/// The most that a neighbour list may add to a support, over h (fluid) or hc (coupling).
+/// The most that a neighbour list may add to a radius, over h where there is fluid, else over the
+/// diameter of the grains.
 inline constexpr double list_skin_ratio = 0.25;
 /// [m] least extent along a periodic direction: twice the largest support with a list's skin, so
 /// that no pair meets through two images.
@@ -76,6 +77,10 @@ bool within(double dt, double limit);
 
 /// [m/s2] largest acceleration that acts from outside on fluid or grains.
 double outer_acceleration(const Scenario& scenario);
+
+/// Steps to the end of a run from its start, changes of time.dt on the way included; 0 if the length
+/// is not given.
+std::uint64_t steps_of_run(const Scenario& resolved);
 
 /// The first step whose time is not before `seconds`, counted from time 0 with a fixed dt.
 std::uint64_t first_step_at(double seconds, double dt);

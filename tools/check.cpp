@@ -90,8 +90,7 @@ std::string report(const ScenarioSource& source, const core::Assessment& a) {
   text += row("dt", fmt::format("{} s, set by {}", core::number_text(a.dt), a.step_set_by));
   text += limits_text(a);
   if (a.steps > 0)
-    text += row("steps", fmt::format("{} (to {:.6g} s)", a.steps,
-                                     static_cast<double>(a.steps) * a.dt));
+    text += row("steps", fmt::format("{}", a.steps));
   for (const core::ScheduledChange& change : s.changes)
     text += row("event " + change.name, fmt::format("after step {}", change.at_step));
   text += "\nlog\n";

@@ -303,6 +303,19 @@ TEST(ResolveEvents, AreSortedAndAChangedStepShiftsTheClock) {
   EXPECT_EQ(s.changes[2].at_step, 3000);  // 1000 steps to 0.2 s, then 2000 of half the length
 }
 
+TEST(ResolveEvents, AChangedStepCountsInTheLengthOfTheRun) {
+  Scenario s = disc();
+  s.time.dt = 2e-4;
+  s.time.until = 0.5;
+  EXPECT_EQ(steps_of_run(resolved(s)), 2500u);
+  s.changes.push_back({"finer", 0.2, -1, {{"time.dt", "0.1 ms"}}});
+  EXPECT_EQ(steps_of_run(resolved(s)), 1000u + 3000u);
+  s.changes.push_back({"later", 0.7, -1, {{"time.dt", "0.05 ms"}}});
+  EXPECT_EQ(steps_of_run(resolved(s)), 4000u);
+  s.time.steps = 7;
+  EXPECT_EQ(steps_of_run(resolved(s)), 7u);
+}
+
 TEST(ResolveEvents, AreCheckedInTheOrderInWhichTheyHappen) {
   Scenario s = disc();
   // Legal only after the step was shortened.

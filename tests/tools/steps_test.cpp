@@ -98,8 +98,9 @@ TEST(Steps, OfALogThatDoesNotStartAtZero) {
 
 TEST(Steps, WhatIsNoStep) {
   const StepLog log(0, 200, 0);
-  for (const char* text : {"", "x", "-1", "1.5", "last-", "last-x", "last+1", "first-1", "t=",
-                           "t=x", "t=1m", "%", "x%", "t=nan", "0x10", "1e3", "99999999999999999999"})
+  for (const char* text :
+       {"", "x", "-1", "1.5", "last-", "last-x", "last+1", "first-1", "t=", "t=x", "t=1m", "%",
+        "x%", "t=nan", "0x10", "1e3", "99999999999999999999"})
     EXPECT_THAT(refusal(text, *log), HasSubstr("expected")) << text;
   EXPECT_THAT(refusal("120%", *log), HasSubstr("expected 0%..100%, got '120%'"));
   EXPECT_THAT(refusal("-1%", *log), HasSubstr("expected 0%..100%"));
