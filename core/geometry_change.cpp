@@ -182,8 +182,8 @@ void follow_porosity(DoubleState& state, const std::vector<double>& eps_before,
   }
 }
 
-/// [m2] Room for fluid in a full box: the sum of eps dx^2 over a lattice of fluid at rest. It counts
-/// as much of each grain as the fluid there will feel of it.
+/// [m2] Room for fluid in a full box: the sum of eps dx^2 over a lattice of fluid at rest. Of each
+/// grain it counts as much as the fluid there will feel of it.
 double room_for_fluid(const Scenario& scenario, const DoubleState& with_grains) {
   const double dx = scenario.fluid.spacing;
   const Box<2> box = domain_box(scenario);
