@@ -6,24 +6,10 @@
 namespace varve::io::codec {
 namespace {
 
-/// Relative spread of step lengths below which they count as equal: times are sums and carry
-/// rounding, and equal steps deserve exact integer weights.
-constexpr double equal_steps = 1e-9;
-
-bool steps_are_equal(unsigned order, const Timeline& times) {
-  const double newest = times[0] - times[1];
-  for (unsigned i = 1; i <= order; ++i) {
-    const double step = times[i] - times[i + 1];
-    if (!(step > 0) || !(newest > 0)) {
-      return true;
-    }
-    const double difference = step - newest;
-    if (difference > equal_steps * newest || difference < -(equal_steps * newest)) {
-      return false;
-    }
-  }
-  return true;
-}
+/// Spread of step lengths, relative to the step and to the time itself, below which they count as
+/// equal: times carry rounding, and equal steps deserve exact integer weights.
+constexpr double equal_to_step = 1e-9;
+constexpr double equal_to_time = 1e-15;
 
 }  // namespace
 
@@ -33,6 +19,23 @@ void Timeline::push(double time) {
                      times_.begin() + static_cast<std::ptrdiff_t>(kept + 1));
   times_[0] = time;
   size_ = kept + 1;
+}
+
+bool steps_are_equal(unsigned order, const Timeline& times) {
+  const double newest = times[0] - times[1];
+  const double size = times[0] < 0 ? -times[0] : times[0];
+  const double spread = equal_to_step * newest + equal_to_time * size;
+  for (unsigned i = 1; i <= order; ++i) {
+    const double step = times[i] - times[i + 1];
+    if (!(step > 0) || !(newest > 0)) {
+      return true;
+    }
+    const double difference = step - newest;
+    if (difference > spread || difference < -spread) {
+      return false;
+    }
+  }
+  return true;
 }
 
 // The products stay exact in double.

@@ -33,14 +33,16 @@ struct Weights {
   std::array<double, order_max> value{};
 };
 
+/// True if the steps that a prediction of this order looks at are equal to a billionth, or if time
+/// does not advance in one of them. `times[0]` is the frame to be predicted.
+bool steps_are_equal(unsigned order, const Timeline& times);
+
 /// Weights that are exact for polynomials of degree `order` at equal steps: alternating binomials.
 Weights equal_step_weights(unsigned order);
 
-/// The same where steps are equal to a billionth. At unequal steps the
-/// slopes d_j / (length of step j), each taken at its step's start, are extrapolated: a first-order
-/// integrator's increments are smooth in just that sense. `times[0]` is the frame to be predicted;
-/// needs times.size() >= order + 2. Steps that do not advance in time count as equal.
-/// Only + - * / in a fixed order, so that every machine finds the same weights.
+/// The same where steps are equal. At unequal steps the slopes d_j / (length of step j), each taken
+/// at its step's start, are extrapolated: a first-order integrator's increments are smooth in just
+/// that sense. `times[0]` is the frame to be predicted; needs times.size() >= order + 2. Only + - * / in a fixed order, so that every machine finds the same weights.
 Weights polynomial_weights(unsigned order, const Timeline& times);
 
 }  // namespace varve::io::codec

@@ -104,15 +104,9 @@ VARVE_INLINE std::int32_t quarter_bits(float x) {
   return quarters < 0 ? 0 : quarters;
 }
 
-/// Level of the running mean after a shift: never negative.
-VARVE_INLINE std::int32_t shifted(std::int32_t level, std::int32_t shift) {
-  const std::int32_t sum = level + shift;
-  return sum < 0 ? 0 : sum > 4500 ? 4500 : sum;
-}
-
 template <class T>
-VARVE_INLINE void expect_body(const StageBlock& block, int shift, const ImageOf<T>* base,
-                              std::size_t n, ImageOf<T>* predicted, Expectation* expected) {
+VARVE_INLINE void expect_body(const StageBlock& block, const ImageOf<T>* base, std::size_t n,
+                              ImageOf<T>* predicted, Expectation* expected) {
   using Signed = std::make_signed_t<ImageOf<T>>;
   constexpr float limit = sizeof(T) == 8 ? 4.0e18f : 1.0e9f;  // conversion to Signed is safe
   alignas(64) float step[block_values];
@@ -149,14 +143,12 @@ VARVE_INLINE void expect_body(const StageBlock& block, int shift, const ImageOf<
     level = other < level ? other : level;
 
     const std::int32_t change = quarter_bits(error) * 16 - level;
-    const std::int32_t now = shifted(level, shift);
-    const std::int32_t fine = now >> 5;
-    const std::int32_t coarse = now >> 6;
-    const std::int32_t height =
-        now < 256 ? fine : now < 512 ? 4 + coarse : 12 + (fine & 1);
+    const std::int32_t fine = level >> 5;
+    const std::int32_t coarse = level >> 6;
+    const std::int32_t height = level < 256 ? fine : level < 512 ? 4 + coarse : 12 + (fine & 1);
     const std::int32_t trend =
         (change >= -95) + (change >= -31) + (change >= 32) + (change >= 96);
-    const std::int32_t offset = now < 512 ? 0 : coarse - 8;
+    const std::int32_t offset = level < 512 ? 0 : coarse - 8;
     const std::int32_t negative = error < 0 ? 128 : 0;
     step[i] = next > -limit && next < limit ? next : 0.0f;
     code[i] = (height * 5 + trend) | negative | (offset << 8);
@@ -171,13 +163,12 @@ VARVE_INLINE void expect_body(const StageBlock& block, int shift, const ImageOf<
 }
 
 /// Moves a running mean an eighth of the way to the newest error.
-VARVE_INLINE std::uint16_t moved_level(std::int32_t level, std::int32_t shift, float error) {
-  const std::int32_t now = shifted(level, shift);
-  return static_cast<std::uint16_t>(now + ((quarter_bits(error) * 16 - now + 4) >> 3));
+VARVE_INLINE std::uint16_t moved_level(std::int32_t level, float error) {
+  return static_cast<std::uint16_t>(level + ((quarter_bits(error) * 16 - level + 4) >> 3));
 }
 
 template <class T>
-VARVE_INLINE void learn_body(const StageBlock& block, int shift, const ImageOf<T>* bits,
+VARVE_INLINE void learn_body(const StageBlock& block, const ImageOf<T>* bits,
                              const ImageOf<T>* base, std::size_t n) {
   using Signed = std::make_signed_t<ImageOf<T>>;
   alignas(64) float residual[block_values];
@@ -194,12 +185,41 @@ VARVE_INLINE void learn_body(const StageBlock& block, int shift, const ImageOf<T
   for (std::size_t i = 0; i < n; ++i) {
     const float r = residual[i];
     const float d1 = r1[i] - r2[i];
-    level0[i] = moved_level(level0[i], shift, r);
-    level1[i] = moved_level(level1[i], shift, r - r1[i]);
-    level2[i] = moved_level(level2[i], shift, r - (r1[i] + d1));
-    level3[i] = moved_level(level3[i], shift, r - (3 * d1 + r3[i]));
+    level0[i] = moved_level(level0[i], r);
+    level1[i] = moved_level(level1[i], r - r1[i]);
+    level2[i] = moved_level(level2[i], r - (r1[i] + d1));
+    level3[i] = moved_level(level3[i], r - (3 * d1 + r3[i]));
   }
   std::copy_n(residual, n, block.incoming);
+}
+
+/// 2 to the power of -e, where 2 to the power of e is the unit in the last place of a value with these
+/// bits. Where that leaves the range of T: the largest power.
+template <class T>
+VARVE_INLINE T units_per_one(ImageOf<T> bits) {
+  using U = ImageOf<T>;
+  constexpr int mantissa = sizeof(T) == 8 ? 52 : 23;
+  constexpr U bias = sizeof(T) == 8 ? 1023 : 127;
+  const U exponent = (bits & ~(U{1} << (sizeof(T) * 8 - 1))) >> mantissa;
+  const U inverse = 2 * bias + mantissa - (exponent == 0 ? U{1} : exponent);
+  return std::bit_cast<T>((inverse > 2 * bias ? 2 * bias : inverse) << mantissa);
+}
+
+template <class T>
+VARVE_INLINE void look_back_body(const ImageOf<T>* newest, const T* const* differences,
+                                 const T* weights, unsigned order, std::size_t n,
+                                 float* residual) {
+  constexpr T limit = static_cast<T>(1e18);
+  alignas(64) T sum[block_values];
+  std::fill_n(sum, n, T{});
+  for (unsigned j = 0; j < order; ++j) {
+    add_products<T, 1>(differences + 1 + j, weights + j, n, sum);
+  }
+  const T* const difference = differences[0];
+  for (std::size_t i = 0; i < n; ++i) {
+    const T left = static_cast<T>(difference[i] - sum[i]) * units_per_one<T>(newest[i]);
+    residual[i] = left > -limit && left < limit ? static_cast<float>(left) : 0.0f;
+  }
 }
 
 /// Bits of a magnitude, by way of a float's exponent: vectors have no instruction of their own for
@@ -250,16 +270,22 @@ VARVE_INLINE void symbolise_body(const ImageOf<T>* residuals, const Expectation*
     TARGET static void advance(const U* bits, U* newest, T* difference, std::size_t n) {          \
       advance_body<T>(bits, newest, difference, n);                                               \
     }                                                                                             \
-    TARGET static void expect(const StageBlock& block, int shift, const U* base, std::size_t n,   \
+    TARGET static void expect(const StageBlock& block, const U* base, std::size_t n,              \
                               U* predicted, Expectation* expected) {                              \
       if constexpr (std::is_floating_point_v<T>) {                                                \
-        expect_body<T>(block, shift, base, n, predicted, expected);                               \
+        expect_body<T>(block, base, n, predicted, expected);                                      \
       }                                                                                           \
     }                                                                                             \
-    TARGET static void learn(const StageBlock& block, int shift, const U* bits, const U* base,    \
+    TARGET static void learn(const StageBlock& block, const U* bits, const U* base,               \
                              std::size_t n) {                                                     \
       if constexpr (std::is_floating_point_v<T>) {                                                \
-        learn_body<T>(block, shift, bits, base, n);                                               \
+        learn_body<T>(block, bits, base, n);                                                      \
+      }                                                                                           \
+    }                                                                                             \
+    TARGET static void look_back(const U* newest, const T* const* differences, const T* weights,  \
+                                 unsigned order, std::size_t n, float* residual) {                \
+      if constexpr (std::is_floating_point_v<T>) {                                                \
+        look_back_body<T>(newest, differences, weights, order, n, residual);                      \
       }                                                                                           \
     }                                                                                             \
     TARGET static void symbolise(const U* residuals, const Expectation* expected, std::size_t n,  \
@@ -277,7 +303,7 @@ VARVE_INLINE void symbolise_body(const ImageOf<T>* residuals, const Expectation*
       }                                                                                           \
     }                                                                                             \
     static constexpr Kernels<T> table{predict, fold,     unfold,    subtract, add,                \
-                                      expect,  learn, symbolise, advance};                        \
+                                      expect,  learn,    look_back, symbolise, advance};          \
   };
 
 // Integers have no second stage.

@@ -50,13 +50,16 @@ struct Kernels {
   void (*subtract)(const U* bits, const U* predicted, std::size_t n, U* residuals);
   /// Inverse of subtract.
   void (*add)(const U* residuals, const U* predicted, std::size_t n, U* bits);
-  /// Floating types only. For each value takes the candidate whose level is lowest, adds what it
-  /// says to the image `base`, and tells what is to be expected of the rest. `shift` is added to
-  /// levels.
-  void (*expect)(const StageBlock& block, int shift, const U* base, std::size_t n, U* predicted,
+  /// Floating types only, as the following three. For each value takes the candidate whose level is
+  /// lowest, adds what it says to the image `base`, and tells what is to be expected of the rest.
+  void (*expect)(const StageBlock& block, const U* base, std::size_t n, U* predicted,
                  Expectation* expected);
-  /// Floating types only. Takes in the true residuals, image of bits[i] - base[i].
-  void (*learn)(const StageBlock& block, int shift, const U* bits, const U* base, std::size_t n);
+  /// Takes in the true residuals, image of bits[i] - base[i].
+  void (*learn)(const StageBlock& block, const U* bits, const U* base, std::size_t n);
+  /// What these weights would have left over in the past: differences[0][i] minus the prediction
+  /// from the differences behind it, in units in the last place of newest[i].
+  void (*look_back)(const U* newest, const T* const* differences, const T* weights, unsigned order,
+                    std::size_t n, float* residual);
   /// Symbols (codec_tans.h) of residuals, which are two's complement, under these expectations.
   void (*symbolise)(const U* residuals, const Expectation* expected, std::size_t n,
                     std::uint8_t* symbols);

@@ -52,12 +52,17 @@ StageBlock Stage::block(std::size_t first) const {
   return block;
 }
 
-unsigned Stage::level(std::size_t value) const {
-  unsigned lowest = level_of(0)[value];
-  for (unsigned k = 1; k < candidates; ++k) {
-    lowest = std::min<unsigned>(lowest, level_of(k)[value]);
+void Stage::rebase_levels(int step, const std::array<std::int16_t, candidates>& shifts) {
+  for (std::size_t v = 0; v < values_; ++v) {
+    std::array<int, candidates> before;
+    for (unsigned k = 0; k < candidates; ++k) {
+      before[k] = level_of(k)[v];
+    }
+    for (unsigned k = 0; k < candidates; ++k) {
+      const int level = before[inherited(k, step)] + shifts[k];
+      level_of(k)[v] = static_cast<std::uint16_t>(std::clamp(level, 0, level_max));
+    }
   }
-  return lowest;
 }
 
 }  // namespace varve::io::codec

@@ -15,6 +15,15 @@
 
 namespace varve::io::codec {
 
+/// Largest level: no error needs more bits.
+inline constexpr int level_max = 4500;
+
+/// Candidate whose level candidate j inherits.
+constexpr unsigned inherited(unsigned j, int step) {
+  const int k = static_cast<int>(j) + step;
+  return static_cast<unsigned>(k < 0 ? 0 : k >= static_cast<int>(candidates) ? candidates - 1 : k);
+}
+
 /// Memory of the second stage for one field, component-major as in Track.
 class Stage {
  public:
@@ -27,13 +36,17 @@ class Stage {
   StageBlock block(std::size_t first) const;
   /// All blocks of a frame were learnt.
   void end_frame() { newest_ = (newest_ + past_residuals - 1) % past_residuals; }
-  /// Lowest level of all candidates of a value.
-  unsigned level(std::size_t value) const;
-
- private:
   float* past(unsigned age) const {
     return past_.get() + (newest_ + age) % past_residuals * stride_;
   }
+  unsigned level(unsigned candidate, std::size_t value) const {
+    return level_of(candidate)[value];
+  }
+  /// Other weights leave other residuals: the level of candidate j becomes that of candidate
+  /// j + step, or of the nearest there is, plus shifts[j].
+  void rebase_levels(int step, const std::array<std::int16_t, candidates>& shifts);
+
+ private:
   std::uint16_t* level_of(unsigned candidate) const { return level_.get() + candidate * stride_; }
 
   std::size_t values_ = 0;

@@ -14,8 +14,21 @@ namespace {
 /// Weight of a class: powers of sqrt(2), rounded.
 constexpr std::array<std::uint32_t, 16> class_weight{0,  4,  6,  8,   11,  16,  23,  32,
                                                      45, 64, 91, 128, 181, 256, 362, 512};
-/// Contexts with fewer symbols are not worth a description of their own.
-constexpr std::uint32_t context_symbols_min = 24;
+/// Groups of contexts of one level with fewer symbols are not worth a description.
+constexpr double group_symbols_min = 24;
+/// A context counts as having seen so many symbols that are distributed as in its group.
+constexpr double prior_symbols = 6;
+
+/// Class whose weight is nearest; 0 for none, at least 1 for some.
+std::uint8_t class_of(double weight) {
+  unsigned best = weight > 0 ? 1 : 0;
+  for (unsigned k = 2; best > 0 && k < class_weight.size(); ++k) {
+    if (std::abs(class_weight[k] - weight) < std::abs(class_weight[best] - weight)) {
+      best = k;
+    }
+  }
+  return static_cast<std::uint8_t>(best);
+}
 
 /// Spreads `total` slots over symbols by weight; every weight above 0 gets at least one slot.
 /// Rounds down, then gives what is left to (or takes what is missing from) the largest.
@@ -81,27 +94,29 @@ Model::Model() {
 }
 
 void Model::fit(const SymbolCounts& counts) {
-  for (unsigned c = 0; c < tans_contexts; ++c) {
-    std::uint32_t sum = 0;
-    std::uint32_t most = 0;
-    for (const std::uint32_t n : counts[c]) {
-      sum += n;
-      most = std::max(most, n);
+  for (unsigned group = 0; group < tans_contexts; group += tans_trends) {
+    std::array<double, tans_symbols> all{};
+    double total = 0;
+    for (unsigned c = group; c < group + tans_trends; ++c) {
+      for (unsigned s = 0; s < tans_symbols; ++s) {
+        all[s] += counts[c][s];
+        total += counts[c][s];
+      }
     }
-    if (sum < context_symbols_min) {
+    if (total < group_symbols_min) {
       continue;
     }
-    for (unsigned s = 0; s < tans_symbols; ++s) {
-      const double weight = 512.0 * counts[c][s] / most;
-      unsigned best = 0;
-      for (unsigned k = 1; weight > 0 && k < 16; ++k) {
-        best = k == 1 || std::abs(class_weight[k] - weight) < std::abs(class_weight[best] - weight)
-                   ? k
-                   : best;
+    for (unsigned c = group; c < group + tans_trends; ++c) {
+      std::array<double, tans_symbols> weight{};
+      for (unsigned s = 0; s < tans_symbols; ++s) {
+        weight[s] = counts[c][s] + prior_symbols * all[s] / total;
       }
-      classes_[c][s] = static_cast<std::uint8_t>(best);
+      const double most = *std::max_element(weight.begin(), weight.end());
+      for (unsigned s = 0; s < tans_symbols; ++s) {
+        classes_[c][s] = class_of(class_weight.back() * weight[s] / most);
+      }
+      classes_[c][tans_escape] = std::max<std::uint8_t>(classes_[c][tans_escape], 1);
     }
-    classes_[c][tans_escape] = std::max<std::uint8_t>(classes_[c][tans_escape], 1);
   }
 }
 

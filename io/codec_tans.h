@@ -18,7 +18,8 @@ namespace varve::io::codec {
 
 inline constexpr unsigned tans_log = 9;  ///< states per context: 2^9
 inline constexpr unsigned tans_states = 1u << tans_log;
-inline constexpr unsigned tans_contexts = 70;
+inline constexpr unsigned tans_trends = 5;  ///< contexts of one level, side by side
+inline constexpr unsigned tans_contexts = 14 * tans_trends;
 inline constexpr unsigned tans_streams = 4;
 
 /// How often each symbol is expected, in 15 classes a factor sqrt(2) apart; 0: never.
@@ -31,7 +32,7 @@ using SymbolCounts = std::array<std::array<std::uint32_t, tans_symbols>, tans_co
 class Model {
  public:
   Model();
-  /// Classes that fit the counts best; contexts that hardly occur keep what they have.
+  /// Classes that fit the counts; levels that hardly occur keep what they have.
   void fit(const SymbolCounts& counts);
   /// Bits that the symbols with these counts would need.
   double cost(const SymbolCounts& counts) const;

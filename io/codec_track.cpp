@@ -40,20 +40,40 @@ void Track<T>::remap(std::span<const std::uint64_t> sources) {
 }
 
 template <class T>
-void Track<T>::predict(const Weights& weights, std::size_t first, std::size_t n, U* image) const {
-  assert(weights.order <= depth_ && n <= block_values);
-  std::array<const T*, order_max> differences{};
-  std::array<T, order_max> factors{};
+typename Track<T>::Terms Track<T>::terms(const Weights& weights, unsigned age, unsigned count,
+                                         std::size_t first) const {
+  Terms result;
+  for (unsigned j = 0; j < count; ++j) {
+    result.differences[j] = difference(age + j) + first;
+  }
   for (unsigned j = 0; j < weights.order; ++j) {
-    differences[j] = difference(j) + first;
     if constexpr (std::is_floating_point_v<T>) {
-      factors[j] = static_cast<T>(weights.value[j]);
+      result.factors[j] = static_cast<T>(weights.value[j]);
     } else {
-      factors[j] = static_cast<T>(static_cast<std::int64_t>(weights.value[j]));
+      result.factors[j] = static_cast<T>(static_cast<std::int64_t>(weights.value[j]));
     }
   }
-  kernels<T>().predict(newest_.data() + first, differences.data(), factors.data(), weights.order, n,
-                       image);
+  return result;
+}
+
+template <class T>
+void Track<T>::predict(const Weights& weights, std::size_t first, std::size_t n, U* image) const {
+  assert(weights.order <= depth_ && n <= block_values);
+  const Terms past = terms(weights, 0, weights.order, first);
+  kernels<T>().predict(newest_.data() + first, past.differences.data(), past.factors.data(),
+                       weights.order, n, image);
+}
+
+template <class T>
+void Track<T>::look_back(const Weights& weights, unsigned age, std::size_t first, std::size_t n,
+                         float* residual) const {
+  if (age + 1 + weights.order > depth_) {
+    std::fill_n(residual, n, 0.0f);
+    return;
+  }
+  const Terms past = terms(weights, age, weights.order + 1, first);
+  kernels<T>().look_back(newest_.data() + first, past.differences.data(), past.factors.data(),
+                         weights.order, n, residual);
 }
 
 template <class T>

@@ -2,6 +2,7 @@
 // frames before, component by component. Both sides keep exactly the same numbers.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -34,6 +35,9 @@ class Track {
   /// Bits of the newest values, component-major.
   std::span<const U> newest() const { return newest_; }
 
+  /// The differences between two consecutive frames, newest first; age < depth().
+  const T* difference(unsigned age) const { return planes_[(head_ + age) % order_max].data; }
+
   /// The frame becomes all that is known.
   void restart(std::span<const std::byte> frame, std::uint64_t count);
   /// Follows a change of particles: new particle i was sources[i], or is new (no_source) and then
@@ -41,10 +45,24 @@ class Track {
   void remap(std::span<const std::uint64_t> sources);
   /// Images predicted for values [first, first + n), all of one component; n <= block_values.
   void predict(const Weights& weights, std::size_t first, std::size_t n, U* image) const;
+  /// What these weights would have left over `age` frames ago (0: at the newest one), in units in the
+  /// last place; zeros where the history does not reach that far. Floating types only.
+  void look_back(const Weights& weights, unsigned age, std::size_t first, std::size_t n,
+                 float* residual) const;
   /// Bits of values [first, first + n) of a frame, all of one component.
   void gather(std::span<const std::byte> frame, std::size_t first, std::size_t n, U* bits) const;
   /// Writes them into a frame.
   void scatter(const U* bits, std::size_t first, std::size_t n, std::span<std::byte> frame) const;
+
+  /// Calls work(first, n) for blocks that cover all values and lie within one component each.
+  template <class Work>
+  void for_blocks(Work&& work) const {
+    for (std::size_t component = 0; component < components_; ++component) {
+      for (std::size_t at = 0; at < count_; at += block_values) {
+        work(component * count_ + at, std::min<std::size_t>(block_values, count_ - at));
+      }
+    }
+  }
 
   /// Between begin_frame and end_frame, every value of the new frame is handed over once, in
   /// blocks, each after its last prediction: the new differences overwrite the oldest ones.
@@ -63,12 +81,15 @@ class Track {
     std::size_t size = 0;
     T* data = nullptr;
   };
+  struct Terms {
+    std::array<const T*, order_max + 1> differences{};
+    std::array<T, order_max> factors{};
+  };
+  /// Differences from age `age` on, at value `first`; weights in T.
+  Terms terms(const Weights& weights, unsigned age, unsigned count, std::size_t first) const;
   void resize_plane(std::size_t slot, std::size_t size);
   /// Slot that the next frame's differences go to.
   std::size_t incoming() const { return (head_ + order_max - 1) % order_max; }
-  const T* difference(unsigned age) const {
-    return planes_[(head_ + age) % order_max].data;
-  }
 
   std::uint32_t components_;
   std::uint64_t count_ = 0;
