@@ -109,7 +109,8 @@ void Contacts<D, P>::build_list(const Constants<D>& c, const std::vector<WallPla
   start_.assign(grains.size() + 1, 0);
   of_grain_.clear();
   for (std::uint32_t i = 0; i < grains.size(); ++i) {
-    // Slots of lower partners come first in slot order, then those of higher ones: ascending partner.
+    // Slots of lower partners come first in slot order, then those of higher ones: ascending
+    // partner.
     of_grain_.insert(of_grain_.end(), pairs[i].begin(), pairs[i].end());
     of_grain_.insert(of_grain_.end(), with_walls[i].begin(), with_walls[i].end());
     start_[i + 1] = static_cast<std::uint32_t>(of_grain_.size());
@@ -178,8 +179,8 @@ typename Contacts<D, P>::Geometry Contacts<D, P>::geometry(
   return g;
 }
 
-/// E10. n points to grain i. F_n = max(0, k delta - eta v_n), eta = alpha sqrt(m_eff k); the dashpot
-/// never pulls. F_t = -k_t xi - eta v_t, cut at mu F_n with the spring shortened to match.
+/// E10. n points to grain i. F_n = max(0, k delta - eta v_n), eta = alpha sqrt(m_eff k); the
+/// dashpot never pulls. F_t = -k_t xi - eta v_t, cut at mu F_n with the spring shortened to match.
 template <int D, class P>
 void Contacts<D, P>::evaluate(const Constants<D>& c, const std::vector<WallPlane>& walls,
                               const GrainState<D, P>& grains, double dt, Slot& slot) const {
@@ -235,8 +236,8 @@ void Contacts<D, P>::evaluate(const Constants<D>& c, const std::vector<WallPlane
       force *= c.friction * normal_force / size;
       if (c.tangential_stiffness > 0) spring = -(force + eta * sliding) / c.tangential_stiffness;
     }
-    // What the spring is shortened by is slip, and the slider's work on it friction; what the spring
-    // takes and does not store is the dashpot's.
+    // What the spring is shortened by is slip, and the slider's work on it friction; what the
+    // spring takes and does not store is the dashpot's.
     const double stored =
         0.5 * c.tangential_stiffness * (dot<D>(spring, spring) - dot<D>(before, before));
     slot.record.friction_loss -= dot<D>(force, tried - spring);

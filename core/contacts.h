@@ -1,6 +1,6 @@
-// Grains within one step: sub-steps at a frozen fluid force, contacts by a linear spring, dashpot and
-// Coulomb slider with a real tangential spring (Cundall and Strack 1979). Every contact is computed
-// once into a slot and summed per grain in ascending partner id, walls last.
+// Grains within one step: sub-steps at a frozen fluid force, contacts by a linear spring, dashpot
+// and Coulomb slider with a real tangential spring (Cundall and Strack 1979). Every contact is
+// computed once into a slot and summed per grain in ascending partner id, walls last.
 #pragma once
 
 #include <cstdint>
@@ -14,8 +14,8 @@
 
 namespace varve::core {
 
-/// What acts on a grain besides contacts, held through the sub-steps of a step: a constant force and a
-/// drag K (u - v) towards the fluid's velocity u.
+/// What acts on a grain besides contacts, held through the sub-steps of a step: a constant force
+/// and a drag K (u - v) towards the fluid's velocity u.
 template <int D>
 struct OuterForce {
   Vec<double, D> force = Vec<double, D>::Zero();           // [N] weight and hydrodynamic force
@@ -23,7 +23,8 @@ struct OuterForce {
   double coefficient = 0;                                  // [N s/m] K
 };
 
-/// What happened at one contact during one step: partial sums, a function of the state at its start.
+/// What happened at one contact during one step: partial sums, a function of the state at its
+/// start.
 template <int D>
 struct ContactRecord {
   ContactKey key;

@@ -49,15 +49,15 @@ class CouplingStage {
 
   /// E3: eps_a = 1 - sum_j V_j W(r_a - r_j) / s_j, written floored to `floored` and as it is to
   /// `porosity`. s_j = S_fluid / (S_fluid + S_wall) is 1 to the bit where no dummy is in reach, and
-  /// hands a grain's volume to the fluid that is there near a wall; the conservative form E3' divides
-  /// by S_fluid. Also computes all weights W of the step.
+  /// hands a grain's volume to the fluid that is there near a wall; the conservative form E3'
+  /// divides by S_fluid. Also computes all weights W of the step.
   void porosity(const Constants<D>& c, const State<D, P>& state,
                 std::span<const Real> volume_before, std::span<const Vec<Position, D>> walls,
                 double wall_volume, std::span<Real> porosity, std::span<Real> floored,
                 Workers& workers);
 
-  /// E11, E12: hydrodynamic forces on all grains and their drag coefficients, at the slip that the step
-  /// starts with. One-way coupling has its weights computed here.
+  /// E11, E12: hydrodynamic forces on all grains and their drag coefficients, at the slip that the
+  /// step starts with. One-way coupling has its weights computed here.
   void forces(const Constants<D>& c, const State<D, P>& state, const FluidView<D, P>& fluid,
               const DragLaw<D>& law, Workers& workers);
 

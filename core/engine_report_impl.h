@@ -66,8 +66,8 @@ void Engine<D, P>::describe(const GeometryReport& report, std::vector<Happening>
         {"contacts_removed", {{"count", std::to_string(report.contacts_removed)}}});
 }
 
-/// Force on the dummies' side: the sum over dummies of minus what each does to the fluid near it, with
-/// the positions, pressures and velocities of the last step's force evaluation.
+/// Force on the dummies' side: the sum over dummies of minus what each does to the fluid near it,
+/// with the positions, pressures and velocities of the last step's force evaluation.
 template <int D, class P>
 Vec<double, D> Engine<D, P>::walls_on_fluid() const {
   Vec<double, D> total = Vec<double, D>::Zero();

@@ -1,5 +1,5 @@
-// Neighbour lists of the fluid and of the wall dummies, rebuilt when something has moved by half the
-// skin. When that happens reaches no bit (core/pair_sweeps.h).
+// Neighbour lists of the fluid and of the wall dummies, rebuilt when something has moved by half
+// the skin. When that happens reaches no bit (core/pair_sweeps.h).
 #pragma once
 
 #include <span>

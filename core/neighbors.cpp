@@ -115,8 +115,8 @@ std::int32_t* near(const double* const* x, const std::int32_t* ids, std::uint32_
 template <int D, class Position>
 Rows candidates(std::span<const Vec<Position, D>> from, const CellGrid<D, Position>& grid,
                 double radius, const Periodicity<D>& period, bool same, Workers& workers) {
-  // Each thread fills its own part; the parts are joined in order, so that the result does not depend
-  // on how many there are.
+  // Each thread fills its own part; the parts are joined in order, so that the result does not
+  // depend on how many there are.
   std::vector<std::vector<std::int32_t>> parts(workers.count());
   Rows rows;
   rows.start.assign(from.size() + 1, 0);

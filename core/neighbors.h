@@ -1,6 +1,6 @@
-// Neighbour candidates as a pure function of positions: everything within a radius, in ascending id.
-// The radius is larger than the kernel's support by a skin, so that lists live for several steps; the
-// pair loops filter by the current distance, hence a list is only an accelerator.
+// Neighbour candidates as a pure function of positions: everything within a radius, in ascending
+// id. The radius is larger than the kernel's support by a skin, so that lists live for several
+// steps; the pair loops filter by the current distance, hence a list is only an accelerator.
 #pragma once
 
 #include <cstddef>
@@ -30,12 +30,12 @@ struct Periodicity {
 template <int D, class Position>
 class CellGrid {
  public:
-  /// Cells no smaller than `cell` [m]. Along a periodic axis the cells divide the period. Points with
-  /// a coordinate that is not finite are put in the first cell.
+  /// Cells no smaller than `cell` [m]. Along a periodic axis the cells divide the period. Points
+  /// with a coordinate that is not finite are put in the first cell.
   void build(std::span<const Vec<Position, D>> points, double cell, const Periodicity<D>& period);
 
-  /// Calls visit(begin, end) for stretches [begin, end) of the cell-ordered arrays that together hold
-  /// all points within one cell of `point`, each once, in no particular order of id.
+  /// Calls visit(begin, end) for stretches [begin, end) of the cell-ordered arrays that together
+  /// hold all points within one cell of `point`, each once, in no particular order of id.
   template <class Visit>
   void around(const Vec<Position, D>& point, Visit&& visit) const;
 
@@ -66,7 +66,8 @@ struct Rows {
 };
 
 /// For every point of `from`, the points of a grid nearer than `radius` (no more than its cell),
-/// ascending; a point's own index is left out where `same` says that the grid holds the same points.
+/// ascending; a point's own index is left out where `same` says that the grid holds the same
+/// points.
 template <int D, class Position>
 Rows candidates(std::span<const Vec<Position, D>> from, const CellGrid<D, Position>& grid,
                 double radius, const Periodicity<D>& period, bool same, Workers& workers);

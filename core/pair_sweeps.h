@@ -3,9 +3,9 @@
 // compiled once per instruction set; the widest one that the processor has is chosen at run time.
 //
 // Eight particles are worked on side by side, each lane summing its own neighbours one after the
-// other in ascending id. A lane therefore does exactly what a plain scalar loop does, at every vector
-// width; a candidate beyond the kernel's support adds an exact zero, so that the skin of the lists
-// reaches no bit.
+// other in ascending id. A lane therefore does exactly what a plain scalar loop does, at every
+// vector width; a candidate beyond the kernel's support adds an exact zero, so that the skin of the
+// lists reaches no bit.
 #pragma once
 
 #include <cstddef>
@@ -19,9 +19,9 @@ namespace varve::core {
 
 inline constexpr std::size_t lanes = 8;
 
-/// Neighbour candidates of groups of `lanes` consecutive particles, interleaved: entry k of lane l in
-/// group g is index[(start[g] + k) * lanes + l]; short lanes are filled with `filler` entries that
-/// contribute nothing (the particle itself, or a padding point far away).
+/// Neighbour candidates of groups of `lanes` consecutive particles, interleaved: entry k of lane l
+/// in group g is index[(start[g] + k) * lanes + l]; short lanes are filled with `filler` entries
+/// that contribute nothing (the particle itself, or a padding point far away).
 struct GroupedLists {
   const std::uint32_t* start = nullptr;   // groups + 1
   const std::int32_t* index = nullptr;

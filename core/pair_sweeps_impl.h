@@ -50,9 +50,9 @@ inline __attribute__((always_inline)) Lane<To> narrow(Lane<From> value) {
 }
 
 // Kernels without their normalisation: value f(q) and slope f'(q)/q, q = r/h, both zero beyond the
-// support (physics: W = sigma/h^D f, grad W = sigma/h^(D+2) (f'/q) r_ab). Wendland 1995 C2: f = (1-q/2)^4
-// (2q+1), f'/q = -5 (1-q/2)^3. B-splines (Schoenberg): truncated powers, slope guarded at q = 0,
-// where the true slope times r_ab is 0.
+// support (physics: W = sigma/h^D f, grad W = sigma/h^(D+2) (f'/q) r_ab). Wendland 1995 C2: f =
+// (1-q/2)^4 (2q+1), f'/q = -5 (1-q/2)^3. B-splines (Schoenberg): truncated powers, slope guarded at
+// q = 0, where the true slope times r_ab is 0.
 template <Kernel K, class T>
 inline __attribute__((always_inline)) Lane<T> kernel_value(Lane<T> q) {
   if constexpr (K == Kernel::wendland_c2) {

@@ -68,7 +68,8 @@ class NumericalFailure : public std::runtime_error {
   double value, limit;
 };
 
-/// A request that the model cannot serve (exit 2): the text names key, value and the largest safe one.
+/// A request that the model cannot serve (exit 2): the text names key, value and the largest safe
+/// one.
 class ModelError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -104,9 +105,9 @@ struct RunOptions {
   int instruction_set = -1;
 };
 
-/// Momentum of the last step, in N (N per m depth in 2D) where not said; D components each. Each sum is
-/// taken by a pass of its own, from the other side than the one that moved the particles: wall forces
-/// over the dummies, reactions over the fluid.
+/// Momentum of the last step, in N (N per m depth in 2D) where not said; D components each. Each
+/// sum is taken by a pass of its own, from the other side than the one that moved the particles:
+/// wall forces over the dummies, reactions over the fluid.
 struct StepLedger {
   std::vector<double> fluid_momentum_change;  ///< [N s] sum m (v' - v)
   std::vector<double> grain_momentum_change;  ///< [N s]
@@ -135,8 +136,9 @@ class Simulation {
  public:
   /// The first state of a resolved scenario (changes scheduled for step 0 applied).
   static std::unique_ptr<Simulation> create(const Scenario& resolved, const RunOptions& options);
-  /// The engine with `resolved` as it stood at genesis, holding a recorded state: changes scheduled up
-  /// to the state's step are taken as done. Throws ModelError if the values do not fit the field table.
+  /// The engine with `resolved` as it stood at genesis, holding a recorded state: changes scheduled
+  /// up to the state's step are taken as done. Throws ModelError if the values do not fit the field
+  /// table.
   static std::unique_ptr<Simulation> restore(const Scenario& resolved,
                                              std::span<const FieldSpan> values,
                                              const RunOptions& options);
@@ -155,8 +157,8 @@ class Simulation {
   virtual const std::vector<Happening>& happenings() const = 0;
   virtual const Counters& counters() const = 0;
 
-  /// One step; then the changes scheduled for its end. Throws NumericalFailure: the state is then that
-  /// of the last good step, unchanged.
+  /// One step; then the changes scheduled for its end. Throws NumericalFailure: the state is then
+  /// that of the last good step, unchanged.
   virtual void advance() = 0;
   /// Replaces the state.
   virtual void set_state(std::span<const FieldSpan> values) = 0;

@@ -1,5 +1,6 @@
-// A fixed set of threads that divide ranges statically and wait by blocking. Results never depend on
-// their number: every range item writes only its own values, and nothing is summed across threads.
+// A fixed set of threads that divide ranges statically and wait by blocking. Results never depend
+// on their number: every range item writes only its own values, and nothing is summed across
+// threads.
 #pragma once
 
 #include <cstddef>
@@ -24,8 +25,8 @@ class Workers {
   unsigned count() const { return static_cast<unsigned>(threads_.size()) + 1; }
 
   /// Calls `body(begin, end, thread)` on contiguous parts of [0, items), one part per thread, and
-  /// returns when all are done. A part is a multiple of `grain` items, the last one excepted. Throws
-  /// the exception of the lowest-numbered thread that had one.
+  /// returns when all are done. A part is a multiple of `grain` items, the last one excepted.
+  /// Throws the exception of the lowest-numbered thread that had one.
   template <class Body>
   void run(std::size_t items, std::size_t grain, Body&& body) {
     using Plain = std::remove_reference_t<Body>;
