@@ -306,6 +306,7 @@ double WeightsChoice<T>::fitted_cost(const Weights& weights) const {
 template <class T>
 Weights WeightsChoice<T>::fit() const {
   const std::size_t lanes = places_.size();
+  if (lanes == 0) return {};  // an empty population has nothing to fit to
   const unsigned base = std::min(order_, fit_order);
   std::vector<double> target(2 * lanes);
   std::vector<double> size(2 * lanes);

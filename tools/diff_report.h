@@ -1,4 +1,5 @@
-// What a comparison found, and the forms in which it is told: text, JSON, JUnit, GitHub annotations.
+// What a comparison found, and the forms in which it is told: text, JSON, JUnit, GitHub
+// annotations.
 #pragma once
 
 #include <cstdint>

@@ -250,7 +250,9 @@ DigestFile read_digest_file(const std::string& path) {
 
 void write_digest_file(const DigestFile& file, const std::string& path, bool overwrite) {
   namespace fs = std::filesystem;
-  if (!overwrite && fs::exists(path))
+  if (fs::is_directory(path))
+    throw io::LogError(io::ErrorKind::exists, path, "is a folder; a file is needed");
+  if (!overwrite && fs::is_regular_file(path))
     throw io::LogError(io::ErrorKind::exists, path, "exists already; --overwrite replaces it");
   const std::string text = digest_file_text(file);
   // Devices such as /dev/stdout can't be renamed onto.

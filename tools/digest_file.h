@@ -59,7 +59,8 @@ void write_digest_file(const DigestFile& file, const std::string& path, bool ove
 /// True if a key can't reach a bit of the state: what is recorded, how long the run is, its title.
 bool is_output_key(std::string_view key);
 
-/// Keys with unlike values, as (key, value in a, value in b); "(not set)" where one side lacks a key.
+/// Keys with unlike values, as (key, value in a, value in b); "(not set)" where one side lacks a
+/// key.
 struct KeyDifference {
   std::string key, a, b;
 };

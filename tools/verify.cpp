@@ -47,7 +47,8 @@ std::string json_text(const std::string& path, const Verification& found) {
   return out.dump(2, ' ', false, json::error_handler_t::replace) + "\n";
 }
 
-// Where not even the first record holds there is no reader to ask; the verdict is told all the same.
+// Where not even the first record holds there is no reader to ask; the verdict is told all the
+// same.
 Verification unreadable(const io::LogError& error) {
   Verification out;
   out.completeness = io::Completeness::damaged;
