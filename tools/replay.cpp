@@ -1,7 +1,12 @@
 // varve replay: executes recorded steps again and compares every one with its record.
 #include <fmt/format.h>
+
+#include <algorithm>
+#include <cstring>
+
 #include <nlohmann/json.hpp>
 
+#include "core/stage_digests.h"
 #include "io/log_reader.h"
 #include "tools/branch.h"
 #include "tools/cli.h"
@@ -39,6 +44,34 @@ std::optional<Mismatch> check_first_state(const io::LogReader& log,
   return found;
 }
 
+/// Index of the table of stage digests, or nothing where the scene does not record them.
+std::optional<std::size_t> stage_table(const io::Schema& schema) {
+  for (std::size_t t = 0; t < schema.tables.size(); ++t)
+    if (schema.tables[t].name == "stages" && schema.tables[t].columns.size() == 3) return t;
+  return std::nullopt;
+}
+
+/// The first stage of a step whose recorded digest is not the computed one; empty if all are equal
+/// or none is recorded.
+std::string first_differing_stage(const io::LogReader& log, const io::FrameView& computed) {
+  const auto table = stage_table(log.genesis().schema);
+  const auto recorded = log.tables(computed.step);
+  if (!table || !recorded) return "";
+  const io::FrameView view = recorded->view();
+  const io::TableView &a = view.tables[*table], &b = computed.tables[*table];
+  for (std::uint64_t row = 0; row < std::min(a.rows, b.rows); ++row) {
+    const auto differs = [&](std::size_t column, std::size_t size) {
+      return std::memcmp(a.columns[column].data() + row * size,
+                         b.columns[column].data() + row * size, size) != 0;
+    };
+    if (!differs(0, 1) && !differs(1, 8) && !differs(2, 8)) continue;
+    const auto stage = std::to_integer<std::size_t>(b.columns[0][row]);
+    return stage < core::stage_names.size() ? std::string(core::stage_names[stage])
+                                            : fmt::format("number {}", stage);
+  }
+  return "";
+}
+
 Json first_json(const Mismatch& first) {
   Json object{{"step", std::to_string(first.step)}, {"time_s", first.time}};
   object["field"] = first.field.empty() ? Json() : Json(first.component.value_or(first.field));
@@ -53,7 +86,7 @@ Json first_json(const Mismatch& first) {
 }
 
 void report(const Invocation& invocation, const io::LogReader& log, const ReplayResult& result,
-            unsigned threads) {
+            unsigned threads, const std::string& stage) {
   const bool same = !result.first;
   if (invocation.globals.json) {
     Json object{{"schema", "varve.replay/1"},
@@ -64,11 +97,13 @@ void report(const Invocation& invocation, const io::LogReader& log, const Replay
                 {"last_step", std::to_string(result.last_step)},
                 {"threads", threads},
                 {"first", same ? Json() : first_json(*result.first)}};
+    if (!same && !stage.empty()) object["first"]["stage"] = stage;
     print(object.dump(2) + "\n");
   } else if (!same) {
     print(fmt::format("different: {}: {}\n", log.path(), describe(*result.first)));
     if (result.first->field.empty())
       print("the log stores no state of this step, only its digest: no field can be named\n");
+    if (!stage.empty()) print(fmt::format("first differing stage of the step: {}\n", stage));
   } else if (!invocation.globals.quiet) {
     print(fmt::format("{}: {}: steps {} to {} executed again with {} thread{}, {} digests equal\n",
                       result.stopped ? "stopped" : "identical", log.path(), result.started_at,
@@ -122,6 +157,10 @@ int replay_verb(const Invocation& invocation) {
   if (!invocation.has("force"))
     require_this_engine(*log, "; --force compares all the same, forks need no equal revision");
   warn_if_incomplete(*log);
+  if (invocation.has("locate") && !stage_table(log->genesis().schema))
+    throw UsageError(fmt::format(
+        "--locate: {} holds no stage digests; record with -s record.stage_digests=on",
+        log->path()));
   const core::RunOptions options{threads_option(invocation), 0};
   std::optional<Emitter> emitter;
   if (invocation.has("emit")) emitter.emplace(*log, invocation, options);
@@ -134,6 +173,7 @@ int replay_verb(const Invocation& invocation) {
         fmt::format("--from: step {} lies behind the last step to replay, {}", from, to));
 
   ReplayResult result;
+  std::string stage;
   const StopSignals signals;
   if (from == log->first_step()) {
     result.first = check_first_state(*log, options);
@@ -150,8 +190,9 @@ int replay_verb(const Invocation& invocation) {
       if (emitter) emitter->take(frame, engine->events());
       return signals.received() == 0;
     });
+    if (result.first) stage = first_differing_stage(*log, engine->frame());
   }
-  report(invocation, *log, result, options.threads);
+  report(invocation, *log, result, options.threads, stage);
   if (result.first) return exit_differ;
   return result.stopped ? exit_stopped : exit_ok;
 }
@@ -167,12 +208,14 @@ Verb verb() {
       "first difference with exit 1, naming step, field and particle where the log stores the\n"
       "state.\n\n"
       "  varve replay column.varve --threads 4\n"
-      "  varve replay column.varve --from t=0.2s --to 50%\n";
+      "  varve replay column.varve --from t=0.2s --to 50%\n"
+      "  varve replay column.varve --locate\n";
   verb.options = {
       {"from", "STEP", "first step to check: 12000, t=1.2s, 50%, first, last-100", false, ""},
       {"to", "STEP", "last step to check", false, ""},
       threads_spec(),
       {"force", "", "also where the log is of another engine revision", false, ""},
+      {"locate", "", "name the stage of the step as well; needs recorded stage digests", false, ""},
       {"emit", "A:B", "write the re-executed states of these steps to -o, all stored", false, ""},
       {"output,o", "RUN", "log that --emit writes", false, ""},
       {"overwrite", "", "replace what -o names", false, ""},
