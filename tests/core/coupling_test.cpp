@@ -1,5 +1,5 @@
-// The coupling's averages against closed forms, and its exactness: what grains get is what the fluid
-// loses, a grain's volume is handed out without loss, and lists and threads reach no bit.
+// The coupling's averages against closed forms, and its exactness: what grains get is what the
+// fluid loses, a grain's volume is handed out without loss, and lists and threads reach no bit.
 #include "core/coupling.h"
 
 #include <cmath>
@@ -138,8 +138,8 @@ TEST(CouplingPorosity, OfAHexagonalArrayInContactIsOneMinusPiOverTwoRootThree) {
 }
 
 TEST(CouplingPorosity, HandsOutAGrainsWholeVolume) {
-  // In the open: the lattice sum of a smooth kernel. Near a wall: the dummies' share goes to the fluid.
-  // In the conservative form: exactly, wherever the grain is.
+  // In the open: the lattice sum of a smooth kernel. Near a wall: the dummies' share goes to the
+  // fluid. In the conservative form: exactly, wherever the grain is.
   const double dx = 1e-3;
   for (const V2& place : {V2(15.2e-3, 15.4e-3), V2(15.2e-3, 1.25e-3), V2(1.3e-3, 1.4e-3)})
     for (const bool conservative : {false, true}) {
@@ -191,8 +191,8 @@ TEST(CouplingPorosity, FeltByALoneGrainIsOneToTheBit) {
 }
 
 TEST(CouplingPorosity, FeltInAPackedArrayIsNearThatOfTheArray) {
-  // Leaving the own volume out alone would say 0.65; divided by what the others could fill at most, the
-  // array's 0.2146 comes back.
+  // Leaving the own volume out alone would say 0.65; divided by what the others could fill at most,
+  // the array's 0.2146 comes back.
   Bed bed(40, 40);
   bed.c.porosity_floor = 0.01;
   const double d = bed.c.diameter;
@@ -272,7 +272,8 @@ struct DisturbedBed : Bed {
   }
 };
 
-/// |sum of reactions + sum of forces| over the sum of |forces|, with volumes given for the reaction.
+/// |sum of reactions + sum of forces| over the sum of |forces|, with volumes given for the
+/// reaction.
 double imbalance(const Bed& bed, const std::vector<double>& reaction_volume) {
   V2 sum = V2::Zero();
   double scale = 0;
