@@ -12,7 +12,7 @@ using io::FieldDifference;
 constexpr std::size_t genesis_lines_max = 40;
 
 std::string at_step(const FirstDifference& first) {
-  return fmt::format("step {} (t={} s)", first.step, first.time);
+  return fmt::format("step {} (t={:.9g} s)", first.step, first.time);
 }
 
 std::string ulps(std::uint64_t n) { return fmt::format("{} ULP{}", n, n == 1 ? "" : "s"); }
@@ -20,7 +20,8 @@ std::string ulps(std::uint64_t n) { return fmt::format("{} ULP{}", n, n == 1 ? "
 std::string where(const FirstDifference& first) {
   std::string out = at_step(first);
   if (first.last_equal) {
-    out = fmt::format("a step in {}..{} (t<={} s)", *first.last_equal + 1, first.step, first.time);
+    out = fmt::format("a step in {}..{} (t<={:.9g} s)", *first.last_equal + 1, first.step,
+                      first.time);
     if (*first.last_equal + 1 == first.step) out = at_step(first);
   }
   if (first.field.empty())
@@ -60,7 +61,7 @@ void add_genesis(const DiffReport& report, std::string& out) {
 }
 
 void add_values(const FirstDifference& first, std::string& out) {
-  if (first.field.empty()) return;
+  if (!first.ulp) return;
   out += fmt::format("  a = {}  ({})\n  b = {}  ({})\n", first.a, first.a_decimal, first.b,
                      first.b_decimal);
   if (first.absolute && first.relative)
@@ -96,7 +97,7 @@ void add_growth(const DiffReport& report, std::string& out) {
   if (report.growth.empty()) return;
   out += "growth of the largest difference:\n";
   for (const GrowthSample& sample : report.growth) {
-    out += fmt::format("  step {} (t={} s):", sample.step, sample.time);
+    out += fmt::format("  step {} (t={:.9g} s):", sample.step, sample.time);
     bool any = false;
     for (const FieldDifference& field : sample.fields) {
       if (!field.real || !field.largest) continue;

@@ -70,7 +70,7 @@ class LogComparison {
                                  a_.first_step(), a_.last_step(), b_.first_step(), b_.last_step()));
       return false;
     }
-    if (options_.from) from = std::max(from, parse_step(*options_.from, a_));
+    if (options_.from) from = std::max(from, parse_step(*options_.from, a_, true));
     if (options_.to) to = std::min(to, parse_step(*options_.to, a_));
     if (from > to)
       throw UsageError(fmt::format("--from and --to leave no step that both hold ({} to {})",
