@@ -21,7 +21,8 @@ inline constexpr int level_max = 4500;
 /// Candidate whose level candidate j inherits.
 constexpr unsigned inherited(unsigned j, int step) {
   const int k = static_cast<int>(j) + step;
-  return static_cast<unsigned>(k < 0 ? 0 : k >= static_cast<int>(candidates) ? candidates - 1 : k);
+  const int last = static_cast<int>(candidates) - 1;
+  return static_cast<unsigned>(k < 0 ? 0 : k > last ? last : k);
 }
 
 /// Memory of the second stage for one field, component-major as in Track.
