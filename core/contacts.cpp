@@ -337,8 +337,5 @@ Vec<double, D> Contacts<D, P>::wall_impulse() const {
 template class Contacts<2, DoublePrecision>;
 template class Contacts<2, FloatPrecision>;
 template class Contacts<2, MixedPrecision>;
-template class Contacts<3, DoublePrecision>;
-template class Contacts<3, FloatPrecision>;
-template class Contacts<3, MixedPrecision>;
 
 }  // namespace varve::core

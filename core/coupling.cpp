@@ -196,8 +196,5 @@ void CouplingStage<D, P>::set_drag(std::span<const Vec<double, D>> mean_drag) {
 template class CouplingStage<2, DoublePrecision>;
 template class CouplingStage<2, FloatPrecision>;
 template class CouplingStage<2, MixedPrecision>;
-template class CouplingStage<3, DoublePrecision>;
-template class CouplingStage<3, FloatPrecision>;
-template class CouplingStage<3, MixedPrecision>;
 
 }  // namespace varve::core

@@ -52,11 +52,5 @@ template PairSweeps<2, FloatPrecision> pair_sweeps<2, FloatPrecision>(Kernel, bo
                                                                       InstructionSet);
 template PairSweeps<2, MixedPrecision> pair_sweeps<2, MixedPrecision>(Kernel, bool,
                                                                       InstructionSet);
-template PairSweeps<3, DoublePrecision> pair_sweeps<3, DoublePrecision>(Kernel, bool,
-                                                                        InstructionSet);
-template PairSweeps<3, FloatPrecision> pair_sweeps<3, FloatPrecision>(Kernel, bool,
-                                                                      InstructionSet);
-template PairSweeps<3, MixedPrecision> pair_sweeps<3, MixedPrecision>(Kernel, bool,
-                                                                      InstructionSet);
 
 }  // namespace varve::core
