@@ -183,9 +183,15 @@ void GroupedStorage::assign(const Rows& rows, std::size_t points, Filler filler,
 
 template class CellGrid<2, double>;
 template class CellGrid<2, float>;
+template class CellGrid<3, double>;
+template class CellGrid<3, float>;
 template Rows candidates<2, double>(std::span<const Vec<double, 2>>, const CellGrid<2, double>&,
                                     double, const Periodicity<2>&, bool, Workers&);
 template Rows candidates<2, float>(std::span<const Vec<float, 2>>, const CellGrid<2, float>&,
                                    double, const Periodicity<2>&, bool, Workers&);
+template Rows candidates<3, double>(std::span<const Vec<double, 3>>, const CellGrid<3, double>&,
+                                    double, const Periodicity<3>&, bool, Workers&);
+template Rows candidates<3, float>(std::span<const Vec<float, 3>>, const CellGrid<3, float>&,
+                                   double, const Periodicity<3>&, bool, Workers&);
 
 }  // namespace varve::core
