@@ -2,8 +2,10 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <signal.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
+#include <time.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -33,6 +35,36 @@ std::string reason(int error) { return std::strerror(error); }
 [[noreturn]] void fail_open(const std::string& path, int error) {
   throw LogError(ErrorKind::not_found, path, "cannot be opened: " + reason(error));
 }
+
+// While it lives, a write beyond the process's file size limit fails with EFBIG like any other
+// failed write, instead of ending the process by SIGXFSZ.
+class NoSizeSignal {
+ public:
+  NoSizeSignal() {
+    sigemptyset(&signal_);
+    sigaddset(&signal_, SIGXFSZ);
+    ::pthread_sigmask(SIG_BLOCK, &signal_, &before_);
+  }
+  NoSizeSignal(const NoSizeSignal&) = delete;
+  NoSizeSignal& operator=(const NoSizeSignal&) = delete;
+  ~NoSizeSignal() {
+    const int error = errno;
+    if (raised_) {
+      const timespec at_once{};
+      while (::sigtimedwait(&signal_, nullptr, &at_once) < 0 && errno == EINTR) {
+      }
+    }
+    ::pthread_sigmask(SIG_SETMASK, &before_, nullptr);
+    errno = error;
+  }
+  /// A call has failed with `error`.
+  void failed(int error) { raised_ = raised_ || error == EFBIG; }
+
+ private:
+  sigset_t signal_;
+  sigset_t before_;
+  bool raised_ = false;
+};
 
 class PosixFile final : public File {
  public:
@@ -73,6 +105,7 @@ class PosixFile final : public File {
   }
 
   void write_at(std::uint64_t offset, std::span<const std::byte> bytes) override {
+    NoSizeSignal guard;
     std::size_t done = 0;
     while (done < bytes.size()) {
       const ssize_t put = ::pwrite(descriptor_, bytes.data() + done, bytes.size() - done,
@@ -80,6 +113,7 @@ class PosixFile final : public File {
       if (put < 0 && errno == EINTR) continue;
       if (put <= 0) {
         const int error = put < 0 ? errno : EIO;
+        guard.failed(error);
         const auto left = files_.space_left(path_);
         fail_write(path_,
                    fmt::format("writing {} bytes: {} written, {} bytes free", bytes.size(), done,
@@ -222,7 +256,7 @@ class PosixFileSystem final : public FileSystem {
   }
 
   bool is_locked(const std::string& path) override {
-    const int descriptor = ::open(lock_path(path).c_str(), O_RDWR | O_CLOEXEC);
+    const int descriptor = ::open(lock_path(path).c_str(), O_RDONLY | O_CLOEXEC);
     if (descriptor < 0) return false;
     struct flock range = whole_file(F_WRLCK);
     const int asked = ::fcntl(descriptor, F_OFD_GETLK, &range);

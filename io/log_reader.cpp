@@ -58,6 +58,7 @@ void LogReaderImpl::find_first() {
     const Record& record = walk.record();
     if (!is_step(record.header.kind)) continue;
     first_ = header_of(record, step_message(record));
+    first_known_ = true;
     return;
   }
 }
@@ -109,7 +110,7 @@ void LogReaderImpl::find_end() {
   durable_seq_ = header ? header->durable_seq : 0;
   bool started = header && offset != 0 && header->index_offset == 0 &&
                  header->kind != RecordKind::index;  // too short to have an index yet
-  if (header && !started) {
+  if (header && !started && first_known_) {
     try {
       if (close_by_end_record(*header, offset)) return;
     } catch (const LogError& error) {
@@ -187,8 +188,9 @@ bool LogReaderImpl::walk_on() const {
     try {
       absorb(walk.record());
     } catch (const LogError& error) {
-      if (scan_ || error.kind() != ErrorKind::damaged) throw;
-      return false;
+      if (error.kind() != ErrorKind::damaged && error.kind() != ErrorKind::limit) throw;
+      if (!scan_) return false;
+      completeness_ = Completeness::damaged;  // its bytes hold and make no sense: as if not there
     }
     if (!scan_ && pending_.size() > source_.limits().index_steps_max) return false;
   }

@@ -87,6 +87,7 @@ class LogReaderImpl final : public LogReader {
 
   // What is known of the log's end. Mutable: any read may find damage and go over to scanning.
   mutable StepHeader first_, last_;
+  bool first_known_ = false;  ///< the first step could be read without a scan
   mutable std::uint64_t steps_seen_ = 0;
   mutable std::uint64_t file_end_ = 0;
   mutable std::uint64_t end_ = 0;  ///< behind the last record that counts

@@ -324,6 +324,20 @@ TEST_F(LogDamage, LostIndexCostsNoStep) {
   }
 }
 
+TEST_F(LogDamage, LostFirstStepIsNotInvented) {
+  write_toy_log("log", small(), untimed(files_));
+  LogBytes bytes(files_, "log");
+  const PlacedRecord record = bytes.record(RecordKind::keyframe);
+  bytes.set_byte(record.offset + 50, 0x77).put(files_, "log");
+  const auto reader = LogReader::open("log", &files_);
+  EXPECT_EQ(reader->completeness(), Completeness::damaged);
+  EXPECT_EQ(reader->first_step(), 1U);
+  EXPECT_FALSE(reader->header(0));
+  EXPECT_FALSE(reader->frame(1)) << "a delta upon the lost keyframe";
+  EXPECT_TRUE(reader->frame(8));
+  EXPECT_EQ(reader->last_step(), 20U);
+}
+
 // ---- records out of place ----
 
 TEST_F(LogDamage, RecordLeftOutIsNoticed) {

@@ -2,12 +2,16 @@
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/mman.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <atomic>
 #include <cstdlib>
 #include <filesystem>
+#include <random>
 #include <thread>
 
 #include "io/errors.h"
@@ -41,6 +45,33 @@ class LogShare : public testing::Test {
     io::WriterOptions options;
     options.overwrite = overwrite;
     return LogWriter::create(path_, toy_genesis(options_), run.frame().view(), {}, options);
+  }
+
+  // Starts or continues the run and goes on to its end; never returns.
+  [[noreturn]] void record_on(std::atomic<std::uint64_t>& durable) {
+    try {
+      ToyRun run(options_);
+      io::WriterOptions options;
+      options.sync_seconds = 0.002;
+      options.keyframe_sync_apart_seconds = 0;
+      std::unique_ptr<LogWriter> writer;
+      if (std::filesystem::exists(path_)) {
+        const std::uint64_t from = LogReader::open(path_)->last_step();
+        while (run.frame().step < from) run.advance();
+        writer = LogWriter::reopen(path_, run.frame().view(), options);
+      } else {
+        writer = LogWriter::create(path_, toy_genesis(options_), run.frame().view(), {}, options);
+      }
+      while (run.frame().step < options_.steps) {
+        run.advance();
+        writer->append(run.frame().view(), {});
+        durable = writer->status().durable_step;
+      }
+      writer->close();
+      ::_exit(0);
+    } catch (const LogError&) {
+      ::_exit(1);
+    }
   }
 
   template <typename Do>
@@ -105,6 +136,69 @@ TEST_F(LogShare, LockOfAKilledWriterIsNoObstacle) {
   writer->append(run.frame().view(), {});
   writer->close();
   EXPECT_EQ(LogReader::open(path_)->verify().completeness, Completeness::complete);
+}
+
+TEST_F(LogShare, KillNineAtAnyMomentLosesNoSyncedStepAndEndsLikeAnUnkilledRun) {
+  options_.steps = 400;
+  options_.beads = 20;
+  write_toy_log(path_, options_, {});
+  const io::Digest chain = LogReader::open(path_)->header(options_.steps)->chain;
+  std::filesystem::remove(path_);
+  // Where the child says what it knows to be durable.
+  auto* const durable = static_cast<std::atomic<std::uint64_t>*>(
+      ::mmap(nullptr, 4096, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0));
+  ASSERT_NE(durable, MAP_FAILED);
+  *durable = 0;
+  const int cycles = std::getenv("VARVE_LONG") ? 10000 : 25;
+  std::mt19937 generator(3);
+  int kills = 0;
+  for (int cycle = 0; cycle < cycles; ++cycle) {
+    const pid_t child = ::fork();
+    if (child == 0) record_on(*durable);
+    std::this_thread::sleep_for(std::chrono::microseconds(generator() % 30000));
+    ::kill(child, SIGKILL);
+    int status = 0;
+    ASSERT_EQ(::waitpid(child, &status, 0), child);
+    ASSERT_TRUE(WIFSIGNALED(status) || WEXITSTATUS(status) == 0) << "the child failed";
+    kills += WIFSIGNALED(status) ? 1 : 0;
+    if (!std::filesystem::exists(path_)) continue;
+    const auto reader = LogReader::open(path_);
+    ASSERT_GE(reader->last_step(), durable->load());
+    ASSERT_NE(reader->completeness(), Completeness::damaged);
+    if (reader->last_step() < options_.steps) continue;
+    ASSERT_EQ(reader->header(options_.steps)->chain, chain);
+    ASSERT_EQ(reader->verify().completeness, Completeness::complete);
+    std::filesystem::remove(path_);
+    *durable = 0;
+  }
+  RecordProperty("kills", kills);
+  EXPECT_GT(kills, cycles / 2);
+  ::munmap(durable, 4096);
+}
+
+TEST_F(LogShare, FileSizeLimitIsAnErrorNotADeath) {
+  const pid_t child = ::fork();
+  if (child == 0) {
+    ::rlimit limit{20000, 20000};
+    ::setrlimit(RLIMIT_FSIZE, &limit);
+    ToyRun run(options_);
+    const auto writer = create(run);
+    try {
+      for (;;) {
+        run.advance();
+        writer->append(run.frame().view(), {});
+      }
+    } catch (const LogError& error) {
+      ::_exit(error.kind() == ErrorKind::write_failed ? 17 : 18);
+    }
+  }
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  ASSERT_TRUE(WIFEXITED(status));
+  EXPECT_EQ(WEXITSTATUS(status), 17);
+  const auto reader = LogReader::open(path_);
+  EXPECT_GT(reader->last_step(), 10U);
+  EXPECT_NE(reader->completeness(), Completeness::damaged);
 }
 
 TEST_F(LogShare, OfRacingWritersExactlyOneWins) {
