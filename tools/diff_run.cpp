@@ -7,8 +7,10 @@
 #include "io/errors.h"
 #include "tools/cli.h"
 #include "tools/diff_genesis.h"
+#include "tools/diff_reexecute.h"
 #include "tools/diff_search.h"
 #include "tools/diff_states.h"
+#include "tools/scratch_folder.h"
 #include "tools/steps.h"
 
 namespace varve::tools {
@@ -23,7 +25,7 @@ void not_comparable(DiffReport& report, std::string reason) {
 class LogComparison {
  public:
   LogComparison(const io::LogReader& a, const io::LogReader& b, const DiffOptions& options)
-      : a_(a), b_(b), options_(options), pair_{a, b, {}, options.tolerances} {}
+      : a_(a), b_(b), options_(options), pair_{&a, &b, {}, options.tolerances} {}
 
   DiffReport run() {
     report_.a = a_.path();
@@ -157,12 +159,41 @@ class LogComparison {
 
   void judge_bits(std::uint64_t step) {
     report_.verdict = Verdict::different;
+    provide_states(step, step);
     report_.first = first_at(step, false);
+    // What was executed again is one step only; growth is told from what the logs store.
+    pair_.a = &a_;
+    pair_.b = &b_;
     if (last_equal_ && *last_equal_ + 1 != step) report_.first->last_equal = last_equal_;
     shown_ = step;
   }
 
+  /// Has the engine make the states of steps from..to that a log does not store, if it can.
+  void provide_states(std::uint64_t from, std::uint64_t to) {
+    const auto provide = [&](const io::LogReader& log, const char* name,
+                             std::unique_ptr<io::LogReader>& made, const io::LogReader*& used) {
+      const io::Genesis& genesis = log.genesis();
+      const bool sparse = genesis.tier == io::Tier::digests || genesis.every > 1;
+      if (!sparse || (from == to && stores_state(log, from))) return;
+      if (!scratch_) scratch_.emplace();
+      Reexecution again = reexecute(log, from, to, *scratch_, name);
+      if (again.log) {
+        made = std::move(again.log);
+        used = made.get();
+        report_.notes.push_back(
+            fmt::format("{} stores no states of steps {} to {}: they were "
+                        "executed again, their digests are the recorded ones",
+                        name, from, to));
+      } else {
+        report_.notes.push_back(fmt::format("{}: {}", name, again.problem));
+      }
+    };
+    provide(a_, "a", made_a_, pair_.a);
+    provide(b_, "b", made_b_, pair_.b);
+  }
+
   void judge_states(std::uint64_t start) {
+    provide_states(start, report_.to);
     const StateScan scan = scan_states(pair_, start, report_.to);
     report_.steps_compared = start - report_.from + scan.compared;
     if (scan.without_state != 0)
@@ -194,7 +225,7 @@ class LogComparison {
       report_.fields = states->fields;
       if (out.field.empty()) out.why_no_field = "though no field of the state differs";
     } else {
-      out.why_no_field = pair_.why_no_state(step);
+      out.why_no_field = why_no_state(*pair_.a, *pair_.b, step);
     }
     return out;
   }
@@ -214,6 +245,8 @@ class LogComparison {
   const DiffOptions& options_;
   StatePair pair_;
   DiffReport report_;
+  std::optional<ScratchFolder> scratch_;
+  std::unique_ptr<io::LogReader> made_a_, made_b_;  ///< re-executed states
   bool chains_comparable_ = true;
   std::optional<std::uint64_t> last_equal_;
   std::optional<std::uint64_t> shown_;  ///< first step with any difference

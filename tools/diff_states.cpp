@@ -15,17 +15,12 @@ std::string tier_text(const io::Genesis& genesis) {
   return out;
 }
 
-bool stores(const io::LogReader& log, std::uint64_t step) {
-  const auto header = log.header(step);
-  return header && header->has_state;
-}
-
 // The last step in [lowest, step] whose state both logs store.
 std::optional<std::uint64_t> common_state(const StatePair& pair, std::uint64_t step,
                                           std::uint64_t lowest) {
   for (;;) {
-    const auto x = pair.a.stored_step_at_or_before(step);
-    const auto y = pair.b.stored_step_at_or_before(step);
+    const auto x = pair.a->stored_step_at_or_before(step);
+    const auto y = pair.b->stored_step_at_or_before(step);
     if (!x || !y) return {};
     const std::uint64_t both = std::min(*x, *y);
     if (both < lowest) return {};
@@ -67,18 +62,23 @@ std::vector<io::Event> events_in(const io::LogReader& log, std::uint64_t from, s
 }  // namespace
 
 io::FrameDifference StatePair::compare(const io::FrameView& x, const io::FrameView& y) const {
-  return io::compare_frames(a.genesis().schema, x, b.genesis().schema, y, match, tolerances);
+  return io::compare_frames(a->genesis().schema, x, b->genesis().schema, y, match, tolerances);
 }
 
 std::optional<io::FrameDifference> StatePair::at(std::uint64_t step) const {
-  if (!stores(a, step) || !stores(b, step)) return {};
-  const auto x = a.frame(step), y = b.frame(step);
+  if (!stores_state(*a, step) || !stores_state(*b, step)) return {};
+  const auto x = a->frame(step), y = b->frame(step);
   if (!x || !y) return {};
   return compare(x->view(), y->view());
 }
 
-std::string StatePair::why_no_state(std::uint64_t step) const {
-  const bool in_a = stores(a, step), in_b = stores(b, step);
+bool stores_state(const io::LogReader& log, std::uint64_t step) {
+  const auto header = log.header(step);
+  return header && header->has_state;
+}
+
+std::string why_no_state(const io::LogReader& a, const io::LogReader& b, std::uint64_t step) {
+  const bool in_a = stores_state(a, step), in_b = stores_state(b, step);
   if (!in_a && !in_b)
     return fmt::format("field unknown: neither side stores the state of this step ({}; {})",
                        tier_text(a.genesis()), tier_text(b.genesis()));
@@ -110,9 +110,9 @@ io::SchemaMatch select_fields(const io::Schema& schema, io::SchemaMatch match,
 
 StateScan scan_states(const StatePair& pair, std::uint64_t from, std::uint64_t to) {
   StateScan out;
-  pair.a.for_each(from, to, [&](const io::StepHeader& header, const io::Frame* x) {
+  pair.a->for_each(from, to, [&](const io::StepHeader& header, const io::Frame* x) {
     // The other log is read in the same order, so its decoder only ever goes one step on.
-    const auto y = x != nullptr ? pair.b.frame(header.step) : std::nullopt;
+    const auto y = x != nullptr ? pair.b->frame(header.step) : std::nullopt;
     if (!y) {
       ++out.without_state;
       return true;
@@ -135,7 +135,7 @@ std::vector<GrowthSample> sample_growth(const StatePair& pair, std::uint64_t fir
     const auto step = common_state(pair, target, lowest);
     if (!step) continue;
     const auto found = pair.at(*step);
-    const auto header = pair.a.header(*step);
+    const auto header = pair.a->header(*step);
     if (!found || !header) continue;
     out.push_back({*step, header->time, found->fields});
     lowest = *step + 1;

@@ -14,17 +14,21 @@ namespace varve::tools {
 
 /// Two logs whose states can be compared: which field is which, and what is accepted.
 struct StatePair {
-  const io::LogReader& a;
-  const io::LogReader& b;
+  const io::LogReader* a;
+  const io::LogReader* b;
   io::SchemaMatch match;  ///< reduced to the fields asked for
   io::Tolerances tolerances;
 
   io::FrameDifference compare(const io::FrameView& x, const io::FrameView& y) const;
   /// Nothing where one side stores no state of this step.
   std::optional<io::FrameDifference> at(std::uint64_t step) const;
-  /// Why at() has nothing to say: "a stores no state of this step (tier digests)".
-  std::string why_no_state(std::uint64_t step) const;
 };
+
+/// True if the log stores the state of `step`, not only its digest.
+bool stores_state(const io::LogReader& log, std::uint64_t step);
+
+/// Why neither can name a field: "a stores no state of this step (tier digests)".
+std::string why_no_state(const io::LogReader& a, const io::LogReader& b, std::uint64_t step);
 
 /// Keeps the pairs of the named fields or populations. Throws UsageError naming what there is.
 io::SchemaMatch select_fields(const io::Schema& schema, io::SchemaMatch match,

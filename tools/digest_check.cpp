@@ -2,16 +2,9 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cstring>
 #include <filesystem>
-#include <fstream>
-#include <sstream>
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <spawn.h>
-#include <sys/wait.h>
-#include <unistd.h>
 #include <nlohmann/json.hpp>
 
 #include "io/errors.h"
@@ -19,6 +12,7 @@
 #include "tools/diff_run.h"
 #include "tools/digest_file.h"
 #include "tools/scratch_folder.h"
+#include "tools/subprocess.h"
 
 namespace varve::tools {
 namespace {
@@ -39,35 +33,6 @@ std::vector<std::string> scenes_in(const std::string& folder) {
                     folder, folder));
   std::sort(names.begin(), names.end());
   return names;
-}
-
-// Runs a program with both outputs in a file; its exit code, or 128 + signal.
-int run_program(const std::vector<std::string>& words, const std::string& output) {
-  std::vector<char*> argv;
-  for (const std::string& word : words) argv.push_back(const_cast<char*>(word.c_str()));
-  argv.push_back(nullptr);
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, output.c_str(),
-                                   O_WRONLY | O_CREAT | O_TRUNC, 0600);
-  posix_spawn_file_actions_adddup2(&actions, STDOUT_FILENO, STDERR_FILENO);
-  pid_t child = 0;
-  const int error = posix_spawn(&child, argv[0], &actions, nullptr, argv.data(), environ);
-  posix_spawn_file_actions_destroy(&actions);
-  if (error != 0)
-    throw ToolError(exit_usage, fmt::format("{}: {}", words[0], std::strerror(error)));
-  int status = 0;
-  while (waitpid(child, &status, 0) < 0 && errno == EINTR) continue;
-  return WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
-}
-
-std::string last_line(const std::string& path) {
-  std::ifstream file(path);
-  std::string line, last;
-  while (std::getline(file, line))
-    if (!line.empty()) last = line;
-  return last;
 }
 
 void compare_or_bless(const std::string& log_path, const std::string& digest_path,
@@ -105,11 +70,12 @@ SceneCheck check_scene(const std::string& folder, const std::string& name,
                                      "--progress",
                                      "none"};
       words.insert(words.end(), options.run_arguments.begin(), options.run_arguments.end());
-      const int code = run_program(words, messages);
-      if (code == 0)
+      const ProgramResult result = run_program(words, messages);
+      if (result.code == exit_ok)
         compare_or_bless(log, (fs::path(folder) / (name + ".digest")).string(), options, out);
       else
-        out.text = fmt::format("the run ended with exit code {}: {}", code, last_line(messages));
+        out.text =
+            fmt::format("the run ended with exit code {}: {}", result.code, result.last_line);
     }
   } catch (const io::LogError& error) {
     out.text = error.what();

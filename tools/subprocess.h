@@ -1,0 +1,17 @@
+// Running another verb of varve from within one.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace varve::tools {
+
+struct ProgramResult {
+  int code = 0;  ///< exit code, 128 + signal, or 127 where it could not be started
+  std::string last_line;  ///< last line that it printed, or why it could not be started
+};
+
+/// Runs the program `words[0]` with no input and both outputs in the file `output`; waits for it.
+ProgramResult run_program(const std::vector<std::string>& words, const std::string& output);
+
+}  // namespace varve::tools
