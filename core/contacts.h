@@ -46,7 +46,10 @@ class Contacts {
   using Position = typename P::Position;
 
   /// Forgets the candidate list, as after a change of the state from outside.
-  void reset() { listed_at_.clear(); }
+  void reset() {
+    listed_at_.clear();
+    slots_.clear();  // or a scene whose last grain was removed would keep the contacts of the dead
+  }
 
   /// Moves all grains through one step of constants.dt. Drag is implicit in every sub-step,
   ///   v' = (v + dt_s/m (F + F_contact + K u)) / (1 + dt_s K/m),
