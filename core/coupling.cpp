@@ -10,11 +10,10 @@ namespace varve::core {
 namespace {
 template <int D>
 using CouplingKernel = SmoothingKernel<D, Kernel::wendland_c2, double>;
-}  // namespace
 
-template <int D, class P>
-double CouplingStage<D, P>::separation(const Constants<D>& c, const Vec<Position, D>& a,
-                                  const Vec<Position, D>& b) const {
+/// Distance over the nearest periodic image.
+template <int D, class T>
+double separation(const Constants<D>& c, const Vec<T, D>& a, const Vec<T, D>& b) {
   double r2 = 0;
   for (int k = 0; k < D; ++k) {
     double d = static_cast<double>(a[k]) - static_cast<double>(b[k]);
@@ -26,19 +25,21 @@ double CouplingStage<D, P>::separation(const Constants<D>& c, const Vec<Position
   return std::sqrt(r2);
 }
 
+}  // namespace
+
 template <int D, class P>
 bool CouplingStage<D, P>::stale(const Constants<D>& c, const State<D, P>& state,
                                 double skin) const {
   // The fluid's own lists watch the fluid with the same skin and are rebuilt together with these.
   if (listed_at_.size() != state.grains.size() || listed_fluid_ != state.fluid.size()) return true;
   for (std::size_t i = 0; i < listed_at_.size(); ++i)
-    if (!(separation(c, state.grains.position[i], listed_at_[i]) < 0.5 * skin)) return true;
+    if (!(separation<D>(c, state.grains.position[i], listed_at_[i]) < 0.5 * skin)) return true;
   return false;
 }
 
 template <int D, class P>
 void CouplingStage<D, P>::rebuild(const Constants<D>& c, const State<D, P>& state,
-                             std::span<const Vec<Position, D>> walls, double skin,
+                             std::span<const WallPlane> walls, double skin,
                              Workers& workers) {
   const double radius = 2 * c.coupling_length + skin;
   const std::span<const Vec<Position, D>> grains(state.grains.position);
@@ -47,8 +48,6 @@ void CouplingStage<D, P>::rebuild(const Constants<D>& c, const State<D, P>& stat
   CellGrid<D, Position> cells;
   cells.build(fluid, radius, c.period);
   fluid_of_ = candidates<D, Position>(grains, cells, radius, c.period, false, workers);
-  cells.build(walls, radius, c.period);
-  walls_of_ = candidates<D, Position>(grains, cells, radius, c.period, false, workers);
   cells.build(grains, radius, c.period);
   grains_of_ = candidates<D, Position>(grains, cells, radius, c.period, true, workers);
   weights_.assign(fluid_of_.index.size(), 0);
@@ -61,6 +60,7 @@ void CouplingStage<D, P>::rebuild(const Constants<D>& c, const State<D, P>& stat
     for (std::uint32_t slot = fluid_of_.start[i]; slot < fluid_of_.start[i + 1]; ++slot)
       near_[next[static_cast<std::size_t>(fluid_of_.index[slot])]++] = {
           static_cast<std::uint32_t>(i), slot};
+  walls_.assign(walls.begin(), walls.end());
   listed_at_.assign(grains.begin(), grains.end());
   listed_fluid_ = fluid.size();
   forces_.assign(grains.size(), {});
@@ -69,43 +69,70 @@ void CouplingStage<D, P>::rebuild(const Constants<D>& c, const State<D, P>& stat
 }
 
 template <int D, class P>
+typename CouplingStage<D, P>::Images CouplingStage<D, P>::images(const Constants<D>& c,
+                                                                 const Vec<double, D>& x) const {
+  // Along each axis: the place itself and its mirror image in either wall.
+  double places[D][3];
+  int counts[D];
+  for (int k = 0; k < D; ++k) {
+    places[k][0] = x[k];
+    counts[k] = 1;
+  }
+  for (const WallPlane& wall : walls_)
+    if (distance_inside<D>(wall, x) < 2 * c.coupling_length)
+      places[wall.axis][counts[wall.axis]++] = 2 * wall.at - x[wall.axis];
+  Images result;
+  int total = 1;
+  for (int k = 0; k < D; ++k) total *= counts[k];
+  for (int n = 1; n < total; ++n) {  // 0 is the point itself
+    int rest = n;
+    Vec<double, D>& image = result.at[static_cast<std::size_t>(result.count++)];
+    for (int k = 0; k < D; ++k) {
+      image[k] = places[k][rest % counts[k]];
+      rest /= counts[k];
+    }
+  }
+  return result;
+}
+
+template <int D, class P>
 void CouplingStage<D, P>::compute_weights(const Constants<D>& c, const State<D, P>& state,
                                      std::span<const Vec<Position, D>> fluid, Workers& workers) {
   const CouplingKernel<D> kernel(c.coupling_length);
   workers.run(state.grains.size(), 1, [&](std::size_t begin, std::size_t end, unsigned) {
-    for (std::size_t i = begin; i < end; ++i)
+    for (std::size_t i = begin; i < end; ++i) {
+      const Images mirrored = images(c, state.grains.position[i].template cast<double>());
       for (std::uint32_t slot = fluid_of_.start[i]; slot < fluid_of_.start[i + 1]; ++slot) {
         const auto a = static_cast<std::size_t>(fluid_of_.index[slot]);
-        weights_[slot] = kernel.value(separation(c, fluid[a], state.grains.position[i]));
+        const Vec<double, D> x = fluid[a].template cast<double>();
+        double weight = kernel.value(separation<D>(c, fluid[a], state.grains.position[i]));
+        // An image is never nearer than its grain, except to fluid that strayed into the wall: the
+        // grain's own reach holds for both, since lists know of no other.
+        if (weight > 0)
+          for (int n = 0; n < mirrored.count; ++n)
+            weight +=
+                kernel.value(separation<D>(c, x, mirrored.at[static_cast<std::size_t>(n)]));
+        weights_[slot] = weight;
       }
+    }
   });
 }
 
 template <int D, class P>
 void CouplingStage<D, P>::porosity(const Constants<D>& c, const State<D, P>& state,
-                              std::span<const Real> volume_before,
-                              std::span<const Vec<Position, D>> walls, double wall_volume,
-                              std::span<Real> porosity, std::span<Real> floored,
-                              Workers& workers) {
-  const CouplingKernel<D> kernel(c.coupling_length);
+                              std::span<const Real> volume_before, std::span<Real> porosity,
+                              std::span<Real> floored, Workers& workers) {
   compute_weights(c, state, state.fluid.position, workers);
   workers.run(state.grains.size(), 1, [&](std::size_t begin, std::size_t end, unsigned) {
     for (std::size_t i = begin; i < end; ++i) {
-      const auto dummies = walls_of_.of(i);
       spread_volume_[i] = c.grain_volume;
-      double of_walls = 0;
-      for (const std::int32_t w : dummies)
-        of_walls += wall_volume * kernel.value(separation(c, walls[static_cast<std::size_t>(w)],
-                                                          state.grains.position[i]));
-      if (of_walls == 0 && !c.conservative_porosity) continue;
+      if (!c.conservative_porosity) continue;
       double of_fluid = 0;
       for (std::uint32_t slot = fluid_of_.start[i]; slot < fluid_of_.start[i + 1]; ++slot)
         of_fluid += static_cast<double>(
                         volume_before[static_cast<std::size_t>(fluid_of_.index[slot])]) *
                     weights_[slot];
-      if (of_fluid <= 0) continue;
-      const double whole = c.conservative_porosity ? 1.0 : of_fluid + of_walls;
-      spread_volume_[i] = c.grain_volume * whole / of_fluid;
+      if (of_fluid > 0) spread_volume_[i] = c.grain_volume / of_fluid;
     }
   });
   // Clamps are counted per fluid particle and added up in one fixed order; integers have no order.
@@ -133,7 +160,7 @@ double CouplingStage<D, P>::others_porosity(const Constants<D>& c, const State<D
   const CouplingKernel<D> kernel(c.coupling_length);
   double solid = 0;
   for (const std::int32_t j : grains_of_.of(i))
-    solid += c.grain_volume * kernel.value(separation(c, state.grains.position[i],
+    solid += c.grain_volume * kernel.value(separation<D>(c, state.grains.position[i],
                                                       state.grains.position[static_cast<std::size_t>(j)]));
   const double own = c.grain_volume * kernel.value(0);
   return c.exclude_own_volume ? 1 - solid / (1 - own) : 1 - (solid + own);

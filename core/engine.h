@@ -62,7 +62,6 @@ class Engine final : public Simulation {
     std::vector<Vec<Real, D>> wall_own_velocity, wall_velocity;
     std::vector<Real> wall_volume, wall_viscous_volume, wall_pressure;
     std::size_t wall_count = 0;
-    std::vector<Vec<Position, D>> coupling_wall_position;
     std::vector<OuterForce<D>> outer;  // per grain
   };
 

@@ -65,10 +65,6 @@ void Engine<D, P>::build_walls() {
     work_.wall_volume[w] = volume;
     work_.wall_viscous_volume[w] = dummies[w].kind == Boundary::no_slip ? volume : Real(0);
   }
-  work_.coupling_wall_position.clear();
-  if (!c_.coupled) return;
-  for (const WallDummy<D>& dummy : wall_dummies(scenario_, coupling_dummy_layers(scenario_)))
-    work_.coupling_wall_position.push_back(dummy.position.template cast<Position>());
 }
 
 template <int D, class P>

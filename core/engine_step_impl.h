@@ -78,7 +78,7 @@ void Engine<D, P>::update_lists() {
                  std::span(work_.wall_position.data(), work_.wall_count), c_.support, skin,
                  c_.period, workers_);
   if (c_.coupled)
-    coupling_.rebuild(c_, state_, work_.coupling_wall_position, skin, workers_);
+    coupling_.rebuild(c_, state_, planes_, skin, workers_);
   ++counters_.list_rebuilds;
   count_pass(engine_detail::pass_lists);
 }
@@ -90,9 +90,8 @@ void Engine<D, P>::find_porosity() {
     for (std::size_t a = begin; a < end; ++a)
       work_.volume_before[a] = state_.fluid.mass[a] / state_.fluid.superficial_density[a];
   });
-  const double dummy_volume = integer_power<D>(c_.spacing);
-  coupling_.porosity(c_, state_, work_.volume_before, work_.coupling_wall_position, dummy_volume,
-                     work_.porosity, work_.floored_porosity, workers_);
+  coupling_.porosity(c_, state_, work_.volume_before, work_.porosity, work_.floored_porosity,
+                     workers_);
   digest_stage(Stage::porosity);
   counters_.porosity_clamps += coupling_.fluid_clamps();
   count_pass(engine_detail::pass_porosity);

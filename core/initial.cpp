@@ -123,17 +123,14 @@ std::vector<double> floored_porosity(const Scenario& scenario, const DoubleState
   const Constants<2> c = constants_of<2>(scenario);
   std::vector<double> porosity(state.fluid.size(), 1.0);
   if (!c.two_way || state.grains.size() == 0 || state.fluid.size() == 0) return porosity;
-  std::vector<Vec<double, 2>> walls;
-  for (const WallDummy<2>& dummy : wall_dummies(scenario, coupling_dummy_layers(scenario)))
-    walls.push_back(dummy.position);
   std::vector<double> volume(state.fluid.size());
   for (std::size_t a = 0; a < volume.size(); ++a)
     volume[a] = state.fluid.mass[a] / state.fluid.superficial_density[a];
   Workers alone(1);
   CouplingStage<2, DoublePrecision> coupling;
-  coupling.rebuild(c, state, walls, 0.0, alone);
+  coupling.rebuild(c, state, wall_planes(scenario), 0.0, alone);
   std::vector<double> unfloored(state.fluid.size());
-  coupling.porosity(c, state, volume, walls, c.spacing * c.spacing, unfloored, porosity, alone);
+  coupling.porosity(c, state, volume, unfloored, porosity, alone);
   return porosity;
 }
 
