@@ -85,6 +85,24 @@ std::string field_summary(const FieldDifference& field) {
   return out;
 }
 
+// Bytes of the character of two to four bytes that `text` starts with; 0 if it is none.
+std::size_t utf8_length(std::string_view text) {
+  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
+  const std::size_t length = byte(0) >= 0xf5   ? 0
+                             : byte(0) >= 0xf0 ? 4
+                             : byte(0) >= 0xe0 ? 3
+                             : byte(0) >= 0xc2 ? 2
+                                               : 0;
+  if (length == 0 || text.size() < length) return 0;
+  for (std::size_t i = 1; i < length; ++i)
+    if ((byte(i) & 0xc0) != 0x80) return 0;
+  // Overlong forms, surrogates and what lies beyond the last code point.
+  if ((byte(0) == 0xe0 && byte(1) < 0xa0) || (byte(0) == 0xed && byte(1) >= 0xa0) ||
+      (byte(0) == 0xf0 && byte(1) < 0x90) || (byte(0) == 0xf4 && byte(1) >= 0x90))
+    return 0;
+  return length;
+}
+
 struct Case {
   std::string name, failure;  // no failure text: passed
 };
@@ -142,7 +160,15 @@ std::string json_report(const DiffReport& report) {
 
 std::string xml_escape(std::string_view text) {
   std::string out;
-  for (const char c : text) {
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const char c = text[i];
+    if (static_cast<unsigned char>(c) >= 0x80) {
+      // A name that is no UTF-8 would make the whole document unreadable.
+      const std::size_t length = utf8_length(text.substr(i));
+      out += length == 0 ? std::string_view("?") : text.substr(i, length);
+      i += length == 0 ? 0 : length - 1;
+      continue;
+    }
     switch (c) {
       case '&':
         out += "&amp;";

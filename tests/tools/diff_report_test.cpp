@@ -146,6 +146,9 @@ TEST(DiffReport, JunitHasOneCasePerFieldAndEscapes) {
   EXPECT_THAT(xml, HasSubstr("name=\"field fluid.mass\" time=\"0.000\"/>"));
   EXPECT_THAT(xml, HasSubstr("<failure type=\"different\" message=\"DIFFER first at step 812"));
   EXPECT_EQ(xml_escape("a\x01\tb"), "a?&#9;b");
+  EXPECT_EQ(xml_escape("\xc3\xb6 \xe2\x82\xac \xf0\x9f\x98\x80"),
+            "\xc3\xb6 \xe2\x82\xac \xf0\x9f\x98\x80");
+  EXPECT_EQ(xml_escape("\xff \xc3 \xc0\x80 \xed\xa0\x80 \xe2\x82"), "? ? ?? ??? ??");
   DiffReport identical;
   EXPECT_THAT(junit_report(identical, 0), HasSubstr("tests=\"1\" failures=\"0\""));
 }
