@@ -156,7 +156,8 @@ Choice WeightsChoice<T>::choose(const Track<T>& track, std::span<const std::byte
 template <class T>
 void WeightsChoice<T>::take_sample(const Track<T>& track, std::span<const std::byte> frame) {
   const std::size_t count = track.count();
-  const std::size_t runs = std::max<std::size_t>(1, sample_values / sample_run / track.components());
+  const std::size_t runs =
+      std::max<std::size_t>(1, sample_values / sample_run / track.components());
   const std::size_t stride = std::max(sample_run, count / runs);
   places_.clear();
   for (std::size_t component = 0; component < track.components(); ++component) {
@@ -230,8 +231,8 @@ double WeightsChoice<T>::polynomial_cost(unsigned order, unsigned depth) const {
   return static_cast<double>(sum);
 }
 
-/// While the history grows the second stage has nothing to go by, and the order that is best alone is
-/// best. Later one or two less can be better.
+/// While the history grows the second stage has nothing to go by, and the order that is best alone
+/// is best. Later one or two less can be better.
 template <class T>
 void WeightsChoice<T>::decide_polynomial(unsigned depth) {
   std::array<double, order_max + 1> alone{};
@@ -300,9 +301,9 @@ double WeightsChoice<T>::fitted_cost(const Weights& weights) const {
   return static_cast<double>(sum);
 }
 
-/// Least squares in which each value is weighted by the inverse square of its own error: bits count,
-/// not squares. Finds corrections to the best polynomial, in terms of repeated differences. Order 0
-/// where there is nothing to improve.
+/// Least squares in which each value is weighted by the inverse square of its own error: bits
+/// count, not squares. Finds corrections to the best polynomial, in terms of repeated differences.
+/// Order 0 where there is nothing to improve.
 template <class T>
 Weights WeightsChoice<T>::fit() const {
   const std::size_t lanes = places_.size();

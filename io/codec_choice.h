@@ -55,12 +55,12 @@ class WeightsChoice {
   Weights fit() const;
 
   // The sample. A lane is a sampled value; ages count back from the frame to be predicted.
-  std::vector<std::size_t> places_;           ///< [lane]: which value
-  std::vector<std::int32_t> unit_;            ///< [lane]: quarter bits of one step of the image
+  std::vector<std::size_t> places_;              ///< [lane]: which value
+  std::vector<std::int32_t> unit_;               ///< [lane]: quarter bits of one step of the image
   std::vector<std::vector<double>> sequence_;    ///< [age][lane]: differences of the field
   std::vector<std::vector<double>> table_;       ///< scratch
   std::vector<std::vector<double>> regressors_;  ///< [2 m + age - 1][lane]: m-th differences
-  std::vector<std::vector<std::int32_t>> bits_;  ///< [3 order + age][lane]: of residuals, in quarters
+  std::vector<std::vector<std::int32_t>> bits_;  ///< [3 order + age][lane]: quarters
 
   unsigned order_ = 0;            ///< best polynomial
   Weights fitted_;                ///< order 0: none

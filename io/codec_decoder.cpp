@@ -69,7 +69,8 @@ class Decoder final : public FrameDecoder {
       const FieldDescriptor& field = schema_.fields[i];
       const std::uint64_t count_max = limits_.field_bytes_max / field.bytes_per_particle();
       if (fields[i].count > count_max) {
-        fail_limit(field.name, std::to_string(fields[i].count) + " particles exceed field_bytes_max = " +
+        fail_limit(field.name, std::to_string(fields[i].count) +
+                                   " particles exceed field_bytes_max = " +
                                    std::to_string(limits_.field_bytes_max) + " bytes");
       }
       if (keyframe && !is_whole(fields[i].method)) {
@@ -102,8 +103,9 @@ class Decoder final : public FrameDecoder {
                          double dt) {
     for (const std::size_t i : population.fields) {
       const EncodedField& encoded = fields[i];
-      if (encoded.order != 0 && encoded.method < static_cast<std::uint8_t>(Method::residual_varint)) {
-        fail_damaged(schema_.fields[i].name, "an order of extrapolation where nothing is extrapolated");
+      if (encoded.order != 0 && !is_extrapolated(encoded.method)) {
+        fail_damaged(schema_.fields[i].name,
+                     "an order of extrapolation where nothing is extrapolated");
       }
       if (encoded.method == static_cast<std::uint8_t>(Method::id_edit)) {
         edit(population, i, encoded);

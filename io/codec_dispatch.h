@@ -1,7 +1,7 @@
 // Inner loops exist once in the source, forced inline into wrappers that only differ in the
-// instructions they may use; the wrapper is chosen when the program runs. Chosen by hand, this works
-// with every sanitizer, which ifunc resolvers do not. All loops are element-wise or in integers, so
-// that the choice cannot reach a bit.
+// instructions they may use; the wrapper is chosen when the program runs. Chosen by hand, this
+// works with every sanitizer, which ifunc resolvers do not. All loops are element-wise or in
+// integers, so that the choice cannot reach a bit.
 #pragma once
 
 #if defined(__x86_64__) && defined(__GNUC__)

@@ -14,8 +14,8 @@
 namespace varve::io::codec {
 namespace {
 
-/// Fields of fewer values are written as variable-length numbers or byte planes: they do not pay for
-/// the entropy coder's model.
+/// Fields of fewer values are written as variable-length numbers or byte planes: they do not pay
+/// for the entropy coder's model.
 constexpr std::size_t staged_values_min = 384;
 
 /// Integers have no second stage.

@@ -42,7 +42,8 @@ Weights equal_step_weights(unsigned order);
 
 /// The same where steps are equal. At unequal steps the slopes d_j / (length of step j), each taken
 /// at its step's start, are extrapolated: a first-order integrator's increments are smooth in just
-/// that sense. `times[0]` is the frame to be predicted; needs times.size() >= order + 2. Only + - * / in a fixed order, so that every machine finds the same weights.
+/// that sense. `times[0]` is the frame to be predicted; needs times.size() >= order + 2. Only
+/// + - * / in a fixed order, so that every machine finds the same weights.
 Weights polynomial_weights(unsigned order, const Timeline& times);
 
 }  // namespace varve::io::codec

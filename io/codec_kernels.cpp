@@ -1,6 +1,7 @@
 #include "io/codec_kernels.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <type_traits>
 
@@ -15,6 +16,47 @@ VARVE_INLINE T value_of(ImageOf<T> bits) {
     return std::bit_cast<T>(bits);
   } else {
     return static_cast<T>(bits);
+  }
+}
+
+/// `Stride` 0: known only when the program runs.
+template <class T, std::size_t Stride>
+VARVE_INLINE void gather_strided(const std::byte* at, std::size_t components, std::size_t n,
+                                 ImageOf<T>* bits) {
+  const std::size_t stride = (Stride == 0 ? components : Stride) * sizeof(T);
+  for (std::size_t i = 0; i < n; ++i) {
+    bits[i] = load_bits<T>(at + i * stride);
+  }
+}
+
+template <class T, std::size_t Stride>
+VARVE_INLINE void scatter_strided(const ImageOf<T>* bits, std::size_t components, std::size_t n,
+                                  std::byte* at) {
+  const std::size_t stride = (Stride == 0 ? components : Stride) * sizeof(T);
+  for (std::size_t i = 0; i < n; ++i) {
+    store_bits<T>(at + i * stride, bits[i]);
+  }
+}
+
+template <class T>
+VARVE_INLINE void gather_body(const std::byte* at, std::size_t components, std::size_t n,
+                              ImageOf<T>* bits) {
+  switch (components) {
+    case 1: return gather_strided<T, 1>(at, components, n, bits);
+    case 2: return gather_strided<T, 2>(at, components, n, bits);
+    case 3: return gather_strided<T, 3>(at, components, n, bits);
+    default: return gather_strided<T, 0>(at, components, n, bits);
+  }
+}
+
+template <class T>
+VARVE_INLINE void scatter_body(const ImageOf<T>* bits, std::size_t components, std::size_t n,
+                               std::byte* at) {
+  switch (components) {
+    case 1: return scatter_strided<T, 1>(bits, components, n, at);
+    case 2: return scatter_strided<T, 2>(bits, components, n, at);
+    case 3: return scatter_strided<T, 3>(bits, components, n, at);
+    default: return scatter_strided<T, 0>(bits, components, n, at);
   }
 }
 
@@ -193,8 +235,8 @@ VARVE_INLINE void learn_body(const StageBlock& block, const ImageOf<T>* bits,
   std::copy_n(residual, n, block.incoming);
 }
 
-/// 2 to the power of -e, where 2 to the power of e is the unit in the last place of a value with these
-/// bits. Where that leaves the range of T: the largest power.
+/// 2 to the power of -e, where 2 to the power of e is the unit in the last place of a value with
+/// these bits. Where that leaves the range of T: the largest power.
 template <class T>
 VARVE_INLINE T units_per_one(ImageOf<T> bits) {
   using U = ImageOf<T>;
@@ -257,6 +299,14 @@ VARVE_INLINE void symbolise_body(const ImageOf<T>* residuals, const Expectation*
   template <class T>                                                                              \
   struct NAME {                                                                                   \
     using U = ImageOf<T>;                                                                         \
+    TARGET static void gather(const std::byte* at, std::size_t components, std::size_t n,         \
+                              U* bits) {                                                          \
+      gather_body<T>(at, components, n, bits);                                                    \
+    }                                                                                             \
+    TARGET static void scatter(const U* bits, std::size_t components, std::size_t n,              \
+                               std::byte* at) {                                                   \
+      scatter_body<T>(bits, components, n, at);                                                   \
+    }                                                                                             \
     TARGET static void predict(const U* newest, const T* const* differences, const T* weights,    \
                                unsigned order, std::size_t n, U* image) {                         \
       predict_body<T>(newest, differences, weights, order, n, image);                             \
@@ -302,8 +352,8 @@ VARVE_INLINE void symbolise_body(const ImageOf<T>* residuals, const Expectation*
         bits[i] = bits_of_image<T>(predicted[i] + residuals[i]);                                  \
       }                                                                                           \
     }                                                                                             \
-    static constexpr Kernels<T> table{predict, fold,     unfold,    subtract, add,                \
-                                      expect,  learn,    look_back, symbolise, advance};          \
+    static constexpr Kernels<T> table{gather, scatter, predict, fold,      unfold,     subtract,  \
+                                      add,    expect,  learn,   look_back, symbolise,  advance};  \
   };
 
 // Integers have no second stage.
@@ -313,32 +363,48 @@ VARVE_KERNEL_SET(Avx2, __attribute__((target("avx2,bmi,bmi2"))))
 VARVE_KERNEL_SET(Avx512, __attribute__((target("avx512f,avx512dq,avx512bw,avx512vl,bmi,bmi2"))))
 #endif
 
-template <class T>
-const Kernels<T>& choose() {
 #ifdef VARVE_CODEC_X86
-  if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
-      __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512vl")) {
-    return Avx512<T>::table;
+/// How many of a list of sets, the narrowest first, this machine can run.
+std::size_t usable_sets() {
+  if (!__builtin_cpu_supports("avx2") || !__builtin_cpu_supports("bmi2")) {
+    return 1;
   }
-  if (__builtin_cpu_supports("avx2")) {
-    return Avx2<T>::table;
-  }
-#endif
-  return Baseline<T>::table;
+  const bool wide = __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512dq") &&
+                    __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512vl");
+  return wide ? 3 : 2;
 }
+#endif
 
 }  // namespace
 
 template <class T>
+std::span<const Kernels<T>* const> all_kernels() {
+#ifdef VARVE_CODEC_X86
+  static constexpr std::array<const Kernels<T>*, 3> sets{&Baseline<T>::table, &Avx2<T>::table,
+                                                         &Avx512<T>::table};
+  static const std::size_t usable = usable_sets();
+  return {sets.data(), usable};
+#else
+  static constexpr std::array<const Kernels<T>*, 1> sets{&Baseline<T>::table};
+  return sets;
+#endif
+}
+
+template <class T>
 const Kernels<T>& kernels() {
-  static const Kernels<T>& chosen = choose<T>();
-  return chosen;
+  static const Kernels<T>& widest = *all_kernels<T>().back();
+  return widest;
 }
 
 template const Kernels<double>& kernels<double>();
+template std::span<const Kernels<double>* const> all_kernels<double>();
 template const Kernels<float>& kernels<float>();
+template std::span<const Kernels<float>* const> all_kernels<float>();
 template const Kernels<std::uint64_t>& kernels<std::uint64_t>();
+template std::span<const Kernels<std::uint64_t>* const> all_kernels<std::uint64_t>();
 template const Kernels<std::uint32_t>& kernels<std::uint32_t>();
+template std::span<const Kernels<std::uint32_t>* const> all_kernels<std::uint32_t>();
 template const Kernels<std::uint8_t>& kernels<std::uint8_t>();
+template std::span<const Kernels<std::uint8_t>* const> all_kernels<std::uint8_t>();
 
 }  // namespace varve::io::codec

@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 
 #include "io/codec_image.h"
 
@@ -38,6 +39,10 @@ struct StageBlock {
 template <class T>
 struct Kernels {
   using U = ImageOf<T>;
+  /// bits[i] of scalar i * components from `at` on.
+  void (*gather)(const std::byte* at, std::size_t components, std::size_t n, U* bits);
+  /// Inverse of gather.
+  void (*scatter)(const U* bits, std::size_t components, std::size_t n, std::byte* at);
   /// image[i] of newest[i] + sum_j weights[j] * differences[j][i], summed from j = 0 upwards from
   /// +0 in T. Where the sum is not a number: the image of newest[i]. n <= block_values.
   void (*predict)(const U* newest, const T* const* differences, const T* weights, unsigned order,
@@ -70,5 +75,9 @@ struct Kernels {
 /// The kernels for this machine.
 template <class T>
 const Kernels<T>& kernels();
+
+/// All sets of kernels that this machine can run, the narrowest first.
+template <class T>
+std::span<const Kernels<T>* const> all_kernels();
 
 }  // namespace varve::io::codec

@@ -42,7 +42,8 @@ Layout plan_layout(const Schema& schema) {
         std::find_if(layout.populations.begin(), layout.populations.end(),
                      [&](const PopulationPlan& known) { return known.name == field.population; });
     if (population == layout.populations.end()) {
-      population = layout.populations.insert(population, PopulationPlan{field.population, none, {}});
+      population =
+          layout.populations.insert(population, PopulationPlan{field.population, none, {}});
     }
     if (is_identity(field) && population->identity == none) {
       layout.fields[i].kind = FieldKind::identity;
@@ -58,7 +59,8 @@ Layout plan_layout(const Schema& schema) {
     }
   }
   const auto rank = [&](std::size_t i) {
-    return layout.fields[i].kind == FieldKind::identity ? 0 : layout.fields[i].slopes == none ? 1 : 2;
+    const FieldPlan& plan = layout.fields[i];
+    return plan.kind == FieldKind::identity ? 0 : plan.slopes == none ? 1 : 2;
   };
   for (PopulationPlan& population : layout.populations) {
     std::stable_sort(population.fields.begin(), population.fields.end(),

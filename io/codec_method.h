@@ -23,4 +23,7 @@ enum class Method : std::uint8_t {
 /// True for methods that need no history.
 constexpr bool is_whole(std::uint8_t method) { return method >= 1 && method <= 4; }
 
+/// True for methods that store differences from an extrapolation.
+constexpr bool is_extrapolated(std::uint8_t method) { return method >= 19 && method <= 21; }
+
 }  // namespace varve::io::codec

@@ -146,8 +146,8 @@ void StagedCoder<T>::decode(Track<T>& track, ByteSource& source, const Weights& 
   stage_.end_frame();
 }
 
-/// Counts the frame's symbols, and now and then fits a model to all counts, the older the less; true
-/// if that saves more than its description costs.
+/// Counts the frame's symbols, and now and then fits a model to all counts, the older the less;
+/// true if that saves more than its description costs.
 template <class T>
 bool StagedCoder<T>::improve_model(bool fresh) {
   const std::size_t stride = std::max<std::size_t>(1, symbols_.size() / count_values) | 1;
@@ -191,8 +191,8 @@ void StagedCoder<T>::look_back(const Track<T>& track, const Weights& weights) {
   });
 }
 
-/// What has to be added to the levels that candidates inherit, so that they fit a sample of the frame
-/// on average.
+/// What has to be added to the levels that candidates inherit, so that they fit a sample of the
+/// frame on average.
 template <class T>
 typename StagedCoder<T>::Shifts StagedCoder<T>::find_shifts(const Track<T>& track,
                                                             std::span<const std::byte> frame,

@@ -32,7 +32,8 @@ std::uint8_t class_of(double weight) {
 
 /// Spreads `total` slots over symbols by weight; every weight above 0 gets at least one slot.
 /// Rounds down, then gives what is left to (or takes what is missing from) the largest.
-std::array<std::uint16_t, tans_symbols> normalise(const std::array<std::uint32_t, tans_symbols>& weight) {
+std::array<std::uint16_t, tans_symbols> normalise(
+    const std::array<std::uint32_t, tans_symbols>& weight) {
   std::array<std::uint16_t, tans_symbols> slots{};
   std::uint32_t sum = 0;
   for (const std::uint32_t w : weight) {
@@ -211,7 +212,8 @@ void build(const Model& model, EncodeTables& tables) {
         // A state emits `bits` bits from slots << bits upwards, one less below.
         const auto width = static_cast<unsigned>(std::bit_width(slots[s] - 1u));
         const unsigned bits = slots[s] == 1 ? tans_log : tans_log + 1 - width;
-        tables.step[c][s].delta_bits = (bits << 16) - (static_cast<std::uint32_t>(slots[s]) << bits);
+        tables.step[c][s].delta_bits =
+            (bits << 16) - (static_cast<std::uint32_t>(slots[s]) << bits);
         tables.step[c][s].delta_state = static_cast<std::int32_t>(sum) - slots[s];
         tables.possible[c] |= 1u << s;
       }
@@ -445,9 +447,13 @@ void TansEncoder<U>::encode(std::span<const U> residuals, std::span<const Expect
   Writers writers;
   const std::size_t runs = run == 0 ? 0 : residuals.size() / run;
   const std::size_t values_max = runs * (run / tans_streams + 1);
+  const std::size_t room = values_max * value_bytes_max + 16;
+  if (buffer_size_ < tans_streams * room) {
+    buffer_size_ = tans_streams * room;
+    buffer_ = std::make_unique_for_overwrite<std::byte[]>(buffer_size_);
+  }
   for (unsigned k = 0; k < tans_streams; ++k) {
-    buffers_[k].resize(values_max * value_bytes_max + 16);
-    writers[k].at = buffers_[k].data() + buffers_[k].size();
+    writers[k].at = buffer_.get() + (k + 1) * room;
   }
   for (std::size_t r = runs; r-- > 0;) {
     put_run<U>()(*tables_, residuals.data() + r * run, expected.data() + r * run,
@@ -457,7 +463,7 @@ void TansEncoder<U>::encode(std::span<const U> residuals, std::span<const Expect
   std::size_t sum = 0;
   for (unsigned k = 0; k < tans_streams; ++k) {
     writers[k].at -= writers[k].count > 0;  // put() has left the last bits at the top of that byte
-    sizes[k] = static_cast<std::size_t>(buffers_[k].data() + buffers_[k].size() - writers[k].at);
+    sizes[k] = static_cast<std::size_t>(buffer_.get() + (k + 1) * room - writers[k].at);
     sum += sizes[k];
   }
   out.reserve(out.size() + sum + tans_streams * 12);

@@ -62,7 +62,9 @@ class TansEncoder {
 
  private:
   std::unique_ptr<EncodeTables> tables_;
-  std::array<std::vector<std::byte>, tans_streams> buffers_;
+  /// Room for the longest streams there can be; only what is used of it becomes memory.
+  std::unique_ptr<std::byte[]> buffer_;
+  std::size_t buffer_size_ = 0;
 };
 
 /// Reads them back, piece by piece.

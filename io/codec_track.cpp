@@ -79,41 +79,13 @@ void Track<T>::look_back(const Weights& weights, unsigned age, std::size_t first
 template <class T>
 void Track<T>::gather(std::span<const std::byte> frame, std::size_t first, std::size_t n,
                       U* bits) const {
-  const std::size_t component = first / count_;
-  const std::byte* at = frame.data() + ((first - component * count_) * components_ + component) *
-                                           sizeof(T);
-  const std::size_t stride = components_ * sizeof(T);
-  if (components_ == 1) {
-    for (std::size_t i = 0; i < n; ++i) {
-      bits[i] = load_bits<T>(at + i * sizeof(T));
-    }
-  } else if (components_ == 2) {
-    for (std::size_t i = 0; i < n; ++i) {
-      bits[i] = load_bits<T>(at + i * 2 * sizeof(T));
-    }
-  } else {
-    for (std::size_t i = 0; i < n; ++i) {
-      bits[i] = load_bits<T>(at + i * stride);
-    }
-  }
+  kernels<T>().gather(frame.data() + offset_in_frame(first), components_, n, bits);
 }
 
 template <class T>
 void Track<T>::scatter(const U* bits, std::size_t first, std::size_t n,
                        std::span<std::byte> frame) const {
-  const std::size_t component = first / count_;
-  std::byte* at = frame.data() + ((first - component * count_) * components_ + component) *
-                                     sizeof(T);
-  const std::size_t stride = components_ * sizeof(T);
-  if (components_ == 1) {
-    for (std::size_t i = 0; i < n; ++i) {
-      store_bits<T>(at + i * sizeof(T), bits[i]);
-    }
-  } else {
-    for (std::size_t i = 0; i < n; ++i) {
-      store_bits<T>(at + i * stride, bits[i]);
-    }
-  }
+  kernels<T>().scatter(bits, components_, n, frame.data() + offset_in_frame(first));
 }
 
 template <class T>

@@ -45,8 +45,8 @@ class Track {
   void remap(std::span<const std::uint64_t> sources);
   /// Images predicted for values [first, first + n), all of one component; n <= block_values.
   void predict(const Weights& weights, std::size_t first, std::size_t n, U* image) const;
-  /// What these weights would have left over `age` frames ago (0: at the newest one), in units in the
-  /// last place; zeros where the history does not reach that far. Floating types only.
+  /// What these weights would have left over `age` frames ago (0: at the newest one), in units in
+  /// the last place; zeros where the history does not reach that far. Floating types only.
   void look_back(const Weights& weights, unsigned age, std::size_t first, std::size_t n,
                  float* residual) const;
   /// Bits of values [first, first + n) of a frame, all of one component.
@@ -81,6 +81,11 @@ class Track {
     std::size_t size = 0;
     T* data = nullptr;
   };
+  /// Byte of value `first` in a frame.
+  std::size_t offset_in_frame(std::size_t first) const {
+    const std::size_t component = first / count_;
+    return ((first - component * count_) * components_ + component) * sizeof(T);
+  }
   struct Terms {
     std::array<const T*, order_max + 1> differences{};
     std::array<T, order_max> factors{};

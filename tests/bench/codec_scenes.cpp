@@ -216,7 +216,9 @@ class Flow {
       };
       around([&](std::size_t j) {
         const double w = share(j);
-        sum += w, ux += w * static_cast<double>(v_[2 * j]), uy += w * static_cast<double>(v_[2 * j + 1]);
+        sum += w;
+        ux += w * static_cast<double>(v_[2 * j]);
+        uy += w * static_cast<double>(v_[2 * j + 1]);
       });
       const double slip_x = ux / sum - grain.vx, slip_y = uy / sum - grain.vy;
       const double speed = std::sqrt(slip_x * slip_x + slip_y * slip_y);

@@ -30,7 +30,8 @@ struct SceneState {
   std::vector<Real> rho;
 };
 
-/// Runs a scene and hands every state to `visit`. Throws std::invalid_argument for an unknown scene.
+/// Runs a scene and hands every state to `visit`. Throws std::invalid_argument for an unknown
+/// scene.
 template <class Real>
 void run_scene(const SceneOptions& options,
                const std::function<void(const SceneState<Real>&)>& visit);

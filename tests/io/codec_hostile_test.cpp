@@ -68,8 +68,9 @@ Sample make_sample() {
     }
     set_values(frame, 0, 1, id);
     set_values(frame, 1, 1, std::vector<double>(count, 0.5));
-    set_values(frame, 2, 2, std::vector<double>(x.begin(), x.begin() + 2 * static_cast<long>(count)));
-    set_values(frame, 3, 2, std::vector<double>(v.begin(), v.begin() + 2 * static_cast<long>(count)));
+    const auto values = static_cast<std::ptrdiff_t>(2 * count);
+    set_values(frame, 2, 2, std::vector<double>(x.begin(), x.begin() + values));
+    set_values(frame, 3, 2, std::vector<double>(v.begin(), v.begin() + values));
     set_values(frame, 4, 1, t);
     set_values(frame, 5, 1, number);
     set_values(frame, 6, 3, key);
@@ -160,8 +161,9 @@ TEST(CodecHostile, FlippedBitsNeverCrash) {
     for (std::uint64_t flips = 1 + random() % 3; flips > 0; --flips) {
       EncodedField& encoded = broken.fields[random() % broken.fields.size()];
       if (!encoded.payload.empty()) {
-        const std::size_t byte = random() % 4 == 0 ? random() % std::min<std::size_t>(encoded.payload.size(), 24)
-                                                   : random() % encoded.payload.size();
+        const std::size_t size = encoded.payload.size();
+        const std::size_t reach = random() % 4 == 0 ? std::min<std::size_t>(size, 24) : size;
+        const std::size_t byte = random() % reach;  // headers get more than their share
         encoded.payload[byte] ^= std::byte{1} << (random() % 8);
       }
     }

@@ -27,10 +27,10 @@ class Orbits {
 
   static Schema schema(std::uint32_t components) {
     Schema schema;
-    schema.fields = {id_field("fluid.id", "fluid"),
-                     constant_field("fluid.mass", "fluid", ScalarType::f64),
-                     field("fluid.position", "fluid", ScalarType::f64, components, "fluid.velocity"),
-                     field("fluid.velocity", "fluid", ScalarType::f64, components)};
+    schema.fields = {
+        id_field("fluid.id", "fluid"), constant_field("fluid.mass", "fluid", ScalarType::f64),
+        field("fluid.position", "fluid", ScalarType::f64, components, "fluid.velocity"),
+        field("fluid.velocity", "fluid", ScalarType::f64, components)};
     return schema;
   }
 
@@ -202,7 +202,8 @@ TEST(Codec, FloatsFollowFloats) {
 
 TEST(Codec, DoublesFollowFloats) {
   Schema schema;
-  schema.fields = {field("p.x", "p", ScalarType::f64, 1, "p.v"), field("p.v", "p", ScalarType::f32)};
+  schema.fields = {field("p.x", "p", ScalarType::f64, 1, "p.v"),
+                   field("p.v", "p", ScalarType::f32)};
   Link link(schema);
   std::vector<double> x(1000, 1.0);
   std::vector<float> v(1000, 0.25f);
@@ -262,8 +263,8 @@ TEST(Codec, SpecialValuesKeepTheirBits) {
 
 TEST(Codec, IntegersOfAllWidths) {
   Schema schema;
-  schema.fields = {field("clock.step", "clock", ScalarType::u64), field("a", "p", ScalarType::u64, 2),
-                   field("b", "p", ScalarType::u32, 3), field("c", "p", ScalarType::u8, 1)};
+  schema.fields = {field("clock.step", "clock", ScalarType::u64),
+                   field("a", "p", ScalarType::u64, 2), field("b", "p", ScalarType::u32, 3), field("c", "p", ScalarType::u8, 1)};
   std::mt19937_64 random(3);
   Link link(schema);
   for (int n = 0; n < 40; ++n) {
@@ -456,7 +457,8 @@ void random_case(std::uint64_t seed) {
   for (std::size_t p = 0; p < populations; ++p) {
     const std::string name = "p" + std::to_string(p);
     if (below(2) == 0) {
-      schema.fields.push_back(id_field(name + ".id", name, 1 + static_cast<std::uint32_t>(below(3))));
+      const auto components = static_cast<std::uint32_t>(1 + below(3));
+      schema.fields.push_back(id_field(name + ".id", name, components));
     }
     for (std::size_t k = 1 + below(3); k > 0; --k) {
       const auto type = static_cast<ScalarType>(1 + below(5));

@@ -28,7 +28,8 @@ inline FieldDescriptor field(std::string name, std::string population, ScalarTyp
 
 inline FieldDescriptor id_field(std::string name, std::string population,
                                 std::uint32_t components = 1) {
-  FieldDescriptor result = field(std::move(name), std::move(population), ScalarType::u64, components);
+  FieldDescriptor result =
+      field(std::move(name), std::move(population), ScalarType::u64, components);
   result.is_id = true;
   return result;
 }
