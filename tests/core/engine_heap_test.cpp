@@ -1,5 +1,5 @@
-// Grains at rest on the floor, where porosity is low and changes fast: fluid must not be drawn through
-// the wall, and the heap must come to rest under its weight.
+// Grains at rest on the floor, where porosity is low and changes fast: fluid must not be drawn
+// through the wall, and a heap must come to rest under its weight.
 #include <algorithm>
 
 #include <gtest/gtest.h>

@@ -164,7 +164,8 @@ TYPED_TEST(Neighbors, OfFewOrNoPoints) {
   const Points<D, T> none, one{Vec<T, D>::Constant(T(1))}, two = random_points<D, T>(2, 0.1, 1);
   EXPECT_TRUE((by_cells<D, T>(none, none, 0.1, {}, true)).empty());
   EXPECT_THAT((by_cells<D, T>(one, one, 0.1, {}, true)), testing::ElementsAre(testing::IsEmpty()));
-  EXPECT_THAT((by_cells<D, T>(one, none, 0.1, {}, false)), testing::ElementsAre(testing::IsEmpty()));
+  EXPECT_THAT((by_cells<D, T>(one, none, 0.1, {}, false)),
+              testing::ElementsAre(testing::IsEmpty()));
   EXPECT_THAT((by_cells<D, T>(one, one, 0.1, {}, false)),
               testing::ElementsAre(testing::ElementsAre(0)));
   expect_equal_to_brute_force<D, T>(two, 1.0, {}, "two");
