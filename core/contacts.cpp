@@ -195,7 +195,8 @@ void Contacts<D, P>::evaluate(const Constants<D>& c, const std::vector<WallPlane
       slot.record.end = true;
       slot.record.rebound_speed = dot<D>(relative, g.normal);
       // What the tangential spring still holds goes with it.
-      slot.record.tangential_loss += 0.5 * c.tangential_stiffness * dot<D>(slot.spring, slot.spring);
+      slot.record.tangential_loss +=
+          0.5 * c.tangential_stiffness * dot<D>(slot.spring, slot.spring);
     }
     slot.touching = false;
     slot.spring.setZero();
@@ -204,7 +205,8 @@ void Contacts<D, P>::evaluate(const Constants<D>& c, const std::vector<WallPlane
   const Vec<double, D> arm_i = -c.radius * g.normal, arm_j = c.radius * g.normal;
   if (c.rotation) {
     relative += spin_velocity(grains.spin[slot.i].template cast<double>(), arm_i);
-    if (!slot.is_wall) relative -= spin_velocity(grains.spin[slot.j].template cast<double>(), arm_j);
+    if (!slot.is_wall)
+      relative -= spin_velocity(grains.spin[slot.j].template cast<double>(), arm_j);
   }
   const double normal_speed = dot<D>(relative, g.normal);
   if (!slot.touching) {
@@ -256,8 +258,8 @@ void Contacts<D, P>::check_overlap(const Slot& slot, double overlap, double limi
   if (!(overlap > limit)) return;
   const std::string partner = slot.is_wall ? "wall " + std::to_string(slot.key.partner)
                                            : "grain " + std::to_string(slot.key.partner);
-  throw NumericalFailure("overlap with " + partner, step, "grains.position", slot.key.grain, overlap,
-                         limit, "raise contact.stiffness or lower the impact speed");
+  throw NumericalFailure("overlap with " + partner, step, "grains.position", slot.key.grain,
+                         overlap, limit, "raise contact.stiffness or lower the impact speed");
 }
 
 template <int D, class P>

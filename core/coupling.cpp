@@ -160,8 +160,9 @@ double CouplingStage<D, P>::others_porosity(const Constants<D>& c, const State<D
   const CouplingKernel<D> kernel(c.coupling_length);
   double solid = 0;
   for (const std::int32_t j : grains_of_.of(i))
-    solid += c.grain_volume * kernel.value(separation<D>(c, state.grains.position[i],
-                                                      state.grains.position[static_cast<std::size_t>(j)]));
+    solid += c.grain_volume *
+             kernel.value(separation<D>(c, state.grains.position[i],
+                                        state.grains.position[static_cast<std::size_t>(j)]));
   const double own = c.grain_volume * kernel.value(0);
   return c.exclude_own_volume ? 1 - solid / (1 - own) : 1 - (solid + own);
 }

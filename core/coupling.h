@@ -45,15 +45,15 @@ class CouplingStage {
 
   /// True if a grain or a fluid particle may have come within 2 hc of another that its list lacks.
   bool stale(const Constants<D>& c, const State<D, P>& state, double skin) const;
-  /// Candidates within `skin` beyond the support, by positions as they are now; `walls` mirror grains
-  /// until the next call.
+  /// Candidates within `skin` beyond the support, by positions as they are now; `walls` mirror
+  /// grains until the next call.
   void rebuild(const Constants<D>& c, const State<D, P>& state, std::span<const WallPlane> walls,
                double skin, Workers& workers);
 
-  /// E3: eps_a = 1 - sum_j V_j w_aj, written floored to `floored` and as it is to `porosity`. w_aj is
-  /// W(r_a - r_j) and, near walls, the same of the grain's images in them: what the kernel would spread
-  /// beyond a wall falls to the fluid inside, and porosity is level across it. The conservative form
-  /// E3' divides by sum_b V_b w_bj. Also computes all weights w of the step.
+  /// E3: eps_a = 1 - sum_j V_j w_aj, written floored to `floored` and as it is to `porosity`. w_aj
+  /// is W(r_a - r_j) and, near walls, the same of the grain's images in them: what the kernel would
+  /// spread beyond a wall falls to the fluid inside, and porosity is level across it. The
+  /// conservative form E3' divides by sum_b V_b w_bj. Also computes all weights w of the step.
   void porosity(const Constants<D>& c, const State<D, P>& state,
                 std::span<const Real> volume_before, std::span<Real> porosity,
                 std::span<Real> floored, Workers& workers);

@@ -78,8 +78,8 @@ bool within(double dt, double limit);
 /// [m/s2] largest acceleration that acts from outside on fluid or grains.
 double outer_acceleration(const Scenario& scenario);
 
-/// Steps to the end of a run from its start, changes of time.dt on the way included; 0 if the length
-/// is not given.
+/// Steps to the end of a run from its start, changes of time.dt on the way included; 0 if the
+/// length is not given.
 std::uint64_t steps_of_run(const Scenario& resolved);
 
 /// The first step whose time is not before `seconds`, counted from time 0 with a fixed dt.

@@ -34,7 +34,8 @@ void assign(std::vector<T>& values, const FieldInfo& info, const FieldSpan& span
                      " bytes do not hold " + std::to_string(span.count) + " values of " +
                      std::to_string(sizeof(T)) + " bytes");
   values.resize(span.count);
-  if (span.count > 0) std::memcpy(static_cast<void*>(values.data()), span.bytes.data(), span.bytes.size());
+  if (span.count > 0)
+    std::memcpy(static_cast<void*>(values.data()), span.bytes.data(), span.bytes.size());
 }
 
 }  // namespace engine_detail

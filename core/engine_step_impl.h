@@ -41,8 +41,8 @@ void require_finite(const Numbers& numbers, const char* field, std::uint64_t ste
 
 }  // namespace engine_detail
 
-/// Semi-implicit Euler in two sweeps: superficial density from x(n), v(n); then pressure from it, all
-/// forces, v += dt a, x += dt v. One force evaluation per step.
+/// Semi-implicit Euler in two sweeps: superficial density from x(n), v(n); then pressure from it,
+/// all forces, v += dt a, x += dt v. One force evaluation per step.
 template <int D, class P>
 void Engine<D, P>::advance() {
   happenings_.clear();
@@ -263,7 +263,8 @@ void Engine<D, P>::wrap(Vec<Position, D>& x) const {
 
 template <int D, class P>
 void Engine<D, P>::check_grains() const {
-  // Without fluid there is no sound speed: a grain that crosses itself within a sub-step has failed.
+  // Without fluid there is no sound speed: a grain that crosses itself within a sub-step has
+  // failed.
   const double limit = scenario_.has_fluid()
                            ? scenario_.guards.speed * c_.sound_speed
                            : c_.diameter * static_cast<double>(c_.substeps) / c_.dt;

@@ -112,7 +112,8 @@ struct Separation {
   inline __attribute__((always_inline)) void set(const Lane<typename P::Position>* own,
                                                  const typename P::Position* other,
                                                  const std::int32_t* index,
-                                                 const typename P::Position* period, Real inverse_h) {
+                                                 const typename P::Position* period,
+                                                 Real inverse_h) {
     using Position = typename P::Position;
     r2 = Lane<Real>{};
     for (int c = 0; c < D; ++c) {

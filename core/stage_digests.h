@@ -1,5 +1,5 @@
-// Digests of what each stage of a step computed, so that a difference between two builds can be traced
-// to the stage that made it. Outputs only: never read by a step, never part of the state.
+// Digests of what each stage of a step computed, so that a difference between two builds can be
+// traced to the stage that made it. Outputs only: never read by a step, never part of the state.
 #pragma once
 
 #include <array>

@@ -73,7 +73,8 @@ struct ContactKey {
 template <int D, class P>
 struct ContactState {
   std::vector<ContactKey> key;
-  std::vector<Vec<typename P::Real, D>> spring;  // [m] tangential elongation; empty without rotation
+  std::vector<Vec<typename P::Real, D>>
+      spring;  // [m] tangential elongation; empty without rotation
   std::size_t size() const { return key.size(); }
 };
 

@@ -147,8 +147,8 @@ std::vector<WallPlane> box_walls(double side) {
 }
 
 TEST(CouplingPorosity, HandsOutAGrainsWholeVolumeToTheFluidInsideTheWalls) {
-  // In the open to the lattice's error, near a wall and in a corner by the images; in the conservative
-  // form exactly.
+  // In the open to the lattice's error, near a wall and in a corner by the images; in the
+  // conservative form exactly.
   for (const V2& place : {V2(15.2e-3, 15.4e-3), V2(15.2e-3, 1.25e-3), V2(1.3e-3, 1.4e-3),
                           V2(28.75e-3, 28.7e-3), V2(0.1e-3, 12e-3)})
     for (const bool conservative : {false, true}) {

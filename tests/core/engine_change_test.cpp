@@ -265,9 +265,9 @@ TEST(EngineWidth, KeepsTheBalanceOfMassTheMeanPressureAndAllGrains) {
                   0.5 * each.scenario.grains.diameter);
     }
 
-    // Ten times the sound's way along the longer side. An array that settles raises the mean by itself,
-    // by 1e-3 rho0 c0^2 in 20 ms, and does so faster in a narrower box: such runs are compared with
-    // the same run without the change.
+    // Ten times the sound's way along the longer side. An array that settles raises the mean by
+    // itself, by 1e-3 rho0 c0^2 in 20 ms, and does so faster in a narrower box: such runs are
+    // compared with the same run without the change.
     const Scenario& s = simulation->scenario();
     const double c0 = s.fluid.sound_speed, unit = s.fluid.density * c0 * c0;
     const double until = simulation->clock().time +

@@ -71,7 +71,8 @@ TEST(EngineGuards, NumbersThatAreNotFiniteAreNamedWithTheirField) {
 }
 
 TEST(EngineGuards, ALoneNanIsFoundAtItsParticle) {
-  // In one step a NaN reaches the neighbours too; grains are checked first and name the grain itself.
+  // In one step a NaN reaches the neighbours too; grains are checked first and name the grain
+  // itself.
   const auto simulation = running();
   poison(*simulation, "grains.velocity", 2 * 8 + 1, nan);
   const NumericalFailure grain = failure_of(*simulation);

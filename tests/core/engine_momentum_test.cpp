@@ -116,7 +116,8 @@ TEST(EngineMomentum, ASmallFaultInAnyOneSumFailsTheCheck) {
 V2 walls_by_hand(const Simulation& simulation, const std::vector<double>& position_before,
                  const std::vector<double>& velocity_before, bool asymmetric) {
   const Scenario& s = simulation.scenario();
-  const double h = s.fluid.smoothing_ratio * s.fluid.spacing, dv = s.fluid.spacing * s.fluid.spacing;
+  const double h = s.fluid.smoothing_ratio * s.fluid.spacing,
+               dv = s.fluid.spacing * s.fluid.spacing;
   const SmoothingKernel<2, Kernel::wendland_c2> kernel(h);
   const std::vector<double> mass = field(simulation, "fluid.mass");
   const std::vector<double> rhob = field(simulation, "fluid.superficial_density");
@@ -130,7 +131,8 @@ V2 walls_by_hand(const Simulation& simulation, const std::vector<double>& positi
     for (std::size_t a = 0; a < mass.size(); ++a) {
       const V2 x(position_before[2 * a], position_before[2 * a + 1]);
       const double w = kernel.value((dummy.position - x).norm());
-      const double rho = s.fluid.density + pressure[a] / (s.fluid.sound_speed * s.fluid.sound_speed);
+      const double rho =
+          s.fluid.density + pressure[a] / (s.fluid.sound_speed * s.fluid.sound_speed);
       weights += w;
       p += w * (pressure[a] + rho * gravity.dot(dummy.position - x));
       v += w * V2(velocity_before[2 * a], velocity_before[2 * a + 1]);

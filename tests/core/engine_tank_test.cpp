@@ -56,7 +56,8 @@ TEST(EngineTank, AClosedBoxInTheExcessFormStaysAtRestToTheLastBit) {
   }
 }
 
-/// A run with full pressure over 10 sqrt(H/g), looked at every 2 ms; pressures over the last 0.15 s.
+/// A run with full pressure over 10 sqrt(H/g), looked at every 2 ms; pressures over the last 0.15
+/// s.
 struct RestRun {
   double speed = 0;        // rms at the end over sqrt(gH)
   double peak_energy = 0;  // [J/m]
@@ -97,7 +98,8 @@ struct RestRun {
       }
     }
     for (std::size_t k = 0; k < 10; ++k) energies[k] /= looks[k];
-    for (const auto& [a, sum] : sums) worst_mean = std::max(worst_mean, std::abs(sum.first / sum.second));
+    for (const auto& [a, sum] : sums)
+      worst_mean = std::max(worst_mean, std::abs(sum.first / sum.second));
     speed = speed_rms(*simulation) / std::sqrt(s.gravity.magnitude * depth);
   }
 };
@@ -110,9 +112,9 @@ void report(const RestRun& run) {
                                 std::to_string(run.energies.back() / run.peak_energy));
 }
 
-// h = 1.25 dx, the default for moving grains, leaves the kernel's sum over the lattice 1.8 % short of
-// its integral, and the pressure that carries the liquid is as much too large: at rest wider kernels
-// are needed.
+// h = 1.25 dx, the default for moving grains, leaves the kernel's sum over the lattice 1.8 % short
+// of its integral, and the pressure that carries the liquid is as much too large: at rest wider
+// kernels are needed.
 
 Scenario open_tank(double smoothing, double jitter) {
   Scenario scenario = tank(2e-3);

@@ -15,7 +15,8 @@ struct Named {
   Scenario scenario;
 };
 
-/// Scenes that run all the code there is: contacts, two-way coupling, seams, a free surface, precisions.
+/// Scenes that run all the code there is: contacts, two-way coupling, seams, a free surface,
+/// precisions.
 std::vector<Named> scenes() {
   Scenario column = small_column();
   Scenario seam = small_column();

@@ -264,7 +264,8 @@ TEST(Codec, SpecialValuesKeepTheirBits) {
 TEST(Codec, IntegersOfAllWidths) {
   Schema schema;
   schema.fields = {field("clock.step", "clock", ScalarType::u64),
-                   field("a", "p", ScalarType::u64, 2), field("b", "p", ScalarType::u32, 3), field("c", "p", ScalarType::u8, 1)};
+                   field("a", "p", ScalarType::u64, 2), field("b", "p", ScalarType::u32, 3),
+                   field("c", "p", ScalarType::u8, 1)};
   std::mt19937_64 random(3);
   Link link(schema);
   for (int n = 0; n < 40; ++n) {
