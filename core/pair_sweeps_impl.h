@@ -208,7 +208,8 @@ void density_loop(const SweepData<D, P>& s, std::size_t group_begin, std::size_t
 }
 
 /// Adami, Hu and Adams 2012: pressure and velocity of dummy particles from the fluid around them,
-///   P_w = (sum_f P_f W + g . sum_f rho_f (r_w - r_f) W) / sum_f W,  v_w = 2 v_wall - sum_f v_f W / sum_f W
+///   P_w = (sum_f P_f W + g . sum_f rho_f (r_w - r_f) W) / sum_f W
+///   v_w = 2 v_wall - sum_f v_f W / sum_f W
 template <int D, class P, Kernel K, bool periodic>
 void extrapolate_loop(const SweepData<D, P>& s, std::size_t group_begin, std::size_t group_end) {
   using Real = typename P::Real;
