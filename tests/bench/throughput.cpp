@@ -36,6 +36,7 @@ struct Scene {
   std::string name;
   double width, height;
   std::int64_t rows, columns;
+  double level = 0;  // [m] of fluid under a free surface; 0: a full closed box
 };
 
 struct Configuration {
@@ -59,12 +60,18 @@ double thread_cpu_s() {
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-/// The study's collective set in a box of the given size.
+/// The study's collective set in a box of the given size, or a tank of fluid alone.
 core::Scenario scenario_of(const Scene& scene) {
   core::Scenario scenario;
   scenario.domain.width = scene.width;
   scenario.domain.height = scene.height;
   scenario.fluid.sound_speed = 2.5;
+  if (scene.level > 0) {
+    scenario.domain.top = core::Boundary::free;
+    scenario.fluid.level = scene.level;
+    scenario.fluid.jitter = 0.05;
+    scenario.fluid.sound_speed = 10 * 1.0849;  // 10 sqrt(2 g H) for H = 6 cm
+  }
   scenario.grains.rows = scene.rows;
   scenario.grains.columns = scene.columns;
   scenario.grains.density = 2000;
@@ -179,7 +186,8 @@ Options parse(int argc, char** argv) {
 int throughput(const Options& options) {
   const std::vector<Scene> scenes = {{"1200+1", 0.02, 0.06, 1, 1},
                                      {"7200+32", 0.06, 0.12, 4, 8},
-                                     {"24000+32", 0.20, 0.12, 4, 8}};
+                                     {"24000+32", 0.20, 0.12, 4, 8},
+                                     {"tank", 0.12, 0.09, 0, 0, 0.06}};
   const std::string widest{core::name_of(core::best_instruction_set())};
   const std::vector<Configuration> configurations = {{"baseline, off", 0, false},
                                                      {widest + ", off", -1, false},
@@ -192,7 +200,8 @@ int throughput(const Options& options) {
   fmt::print("{:<10} {:<20} {:<22} {:<22} {:<22} {}\n", "particles", "configuration",
              "10^6 updates/CPU-s", "append ns/part.-step", "writer ns/part.-step", "B/part.-step");
   for (const Scene& scene : scenes) {
-    if (!options.scene.empty() && options.scene != scene.name) continue;
+    // The tank is there for comparison with another code (tests/bench/against_pysph).
+    if (options.scene.empty() ? scene.level > 0 : options.scene != scene.name) continue;
     std::vector<std::vector<Sample>> samples(configurations.size());
     for (unsigned round = 0; round < options.rounds; ++round) {
       for (std::size_t index = 0; index < configurations.size(); ++index) {
