@@ -254,6 +254,11 @@ Branch make_branch(const io::LogReader& parent, const BranchRequest& request,
     branch.first.tables = std::move(tables->tables);
   }
 
+  const std::uint32_t revision = parent.genesis().engine_revision;
+  if (revision != core::engine_revision)
+    changes.push_back({"engine.revision", std::to_string(revision),
+                       std::to_string(core::engine_revision)});
+
   branch.genesis = make_genesis(child, source->schema(), run_options.threads);
   branch.genesis.lineage = make_lineage(parent, request.step, std::move(changes));
   // The child is run from what its log holds, as any later resume or replay of it.

@@ -83,10 +83,9 @@ std::string default_output(const std::string& parent, std::uint64_t step) {
   return (path.parent_path() / name).string();
 }
 
-/// Copies the parent's log, as far as it is whole now, beside the child, where it is found by its
-/// id.
-void copy_parent(const std::string& parent, const std::string& child, bool overwrite) {
-  const fs::path source(parent), folder = fs::path(child).parent_path();
+/// Copies a log, as far as it is written now, beside the child, where it is found by its id.
+void copy_beside(const std::string& log, const std::string& child, bool overwrite) {
+  const fs::path source(log), folder = fs::path(child).parent_path();
   std::error_code error;
   if (fs::equivalent(source.parent_path().empty() ? "." : source.parent_path(),
                      folder.empty() ? "." : folder, error))
@@ -98,6 +97,15 @@ void copy_parent(const std::string& parent, const std::string& child, bool overw
   if (error)
     throw io::LogError(io::ErrorKind::write_failed, copy.string(),
                        "copying the parent: " + error.message());
+}
+
+/// The parent and as many of its ancestors as can be found.
+void copy_family(const io::LogReader& parent, const std::string& child, bool overwrite,
+                 const std::optional<std::string>& parent_option) {
+  copy_beside(parent.path(), child, overwrite);
+  for (auto ancestor = open_parent(parent, parent_option); ancestor;
+       ancestor = open_parent(*ancestor, parent_option))
+    copy_beside(ancestor->path(), child, overwrite);
 }
 
 void describe_branch(const Globals& globals, const io::LogReader& parent, const Branch& branch,
@@ -121,9 +129,10 @@ void describe_branch(const Globals& globals, const io::LogReader& parent, const 
 /// Other revisions may be forked where the state itself is stored; what is not must be re-executed.
 void require_forkable(const io::LogReader& parent, std::uint64_t step) {
   const auto header = parent.header(step);
-  if (header && header->has_state && parent.genesis().engine == engine_name) return;
-  require_this_engine(parent, fmt::format("; the state of step {} is not stored and can't be made "
-                                          "again", step));
+  require_this_engine(parent,
+                      fmt::format("; the state of step {} is not stored and can't be made again",
+                                  step),
+                      header && header->has_state);
 }
 
 int fork(const Invocation& invocation) {
@@ -164,7 +173,8 @@ int fork(const Invocation& invocation) {
     throw UsageError(fmt::format("{}: the parent itself can't be the output", session.path));
   auto writer = io::LogWriter::create(session.path, branch.genesis, branch.first.view(),
                                       branch.events, options);
-  if (invocation.has("detach")) copy_parent(parent->path(), session.path, options.overwrite);
+  if (invocation.has("detach"))
+    copy_family(*parent, session.path, options.overwrite, parent_option);
   describe_branch(session.globals, *parent, branch, session.path);
   parent.reset();
   return run_session(*branch.engine, std::move(writer), session);
@@ -200,7 +210,7 @@ Verb verb() {
       {"output,o", "RUN", "log to write [RUN.fork-STEP.varve]", false, ""},
       {"overwrite", "", "replace an existing log", false, ""},
       {"parent", "PATH", "log or folder with RUN's parent, if --at lies before RUN", false, ""},
-      {"detach", "", "copy the parent's log beside the child", false, ""},
+      {"detach", "", "copy the parent's log, and its ancestors', beside the child", false, ""},
   };
   verb.arguments_min = verb.arguments_max = 1;
   verb.run = fork;

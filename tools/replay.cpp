@@ -154,8 +154,7 @@ class Emitter {
 
 int replay_verb(const Invocation& invocation) {
   const auto log = io::LogReader::open(invocation.arguments.at(0));
-  if (!invocation.has("force"))
-    require_this_engine(*log, "; --force compares all the same, forks need no equal revision");
+  require_this_engine(*log, "; --force compares all the same", invocation.has("force"));
   warn_if_incomplete(*log);
   if (invocation.has("locate") && !stage_table(log->genesis().schema))
     throw UsageError(fmt::format(

@@ -43,6 +43,9 @@ int run(const Invocation& invocation) {
   session.path = invocation.has("output")
                      ? invocation.value("output")
                      : std::filesystem::path(name).stem().string() + ".varve";
+  std::error_code unrelated;
+  if (std::filesystem::equivalent(name, session.path, unrelated))
+    throw UsageError(fmt::format("{}: the scenario itself can't be the output", session.path));
   session.target = no_step ? Target{0, {}} : target_of(source.scenario);
   session.stop_after_s = stop_after_option(invocation);
 

@@ -122,7 +122,15 @@ io::FrameView SimulationEngine::frame() const {
 }
 
 void SimulationEngine::advance() {
-  translated([&] { simulation_->advance(); });
+  try {
+    translated([&] { simulation_->advance(); });
+  } catch (const UsageError& error) {
+    // Nobody asked for anything just now: a scheduled change turned out to be impossible.
+    const std::string step = std::to_string(simulation_->clock().step);
+    throw EngineFailure(fmt::format("step {}: a scheduled change can't be made: {}", step,
+                                    error.what()),
+                        {{"criterion", "scheduled change"}, {"step", step}});
+  }
   take_happenings();
 }
 
@@ -180,8 +188,11 @@ Target target_of(const core::Scenario& resolved) {
   return target;
 }
 
-void require_this_engine(const io::LogReader& log, const std::string& what_else_to_do) {
-  require_same_engine(log, engine_name, core::engine_revision, what_else_to_do);
+void require_this_engine(const io::LogReader& log, const std::string& what_else_to_do,
+                         bool any_revision) {
+  const std::uint32_t revision =
+      any_revision ? log.genesis().engine_revision : core::engine_revision;
+  require_same_engine(log, engine_name, revision, what_else_to_do);
 }
 
 }  // namespace varve::tools

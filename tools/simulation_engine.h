@@ -32,7 +32,7 @@ class SimulationEngine : public io::Engine {
   const io::Schema& schema() const override { return schema_; }
   io::FrameView frame() const override;
   const std::vector<io::Event>& events() const override { return events_; }
-  /// Throws EngineFailure where a guard stops the run.
+  /// Throws EngineFailure where a guard stops the run or a scheduled change can't be made.
   void advance() override;
   /// Throws LogError(mismatch) where the state is not one of this scenario's.
   void restore(const io::FrameView& frame) override;
@@ -67,7 +67,8 @@ io::Genesis make_genesis(const core::Scenario& resolved, const io::Schema& schem
 /// Where the run of a resolved scenario ends: `time.steps` if set, else `time.until`.
 Target target_of(const core::Scenario& resolved);
 
-/// Refuses logs of other engines and revisions (UsageError).
-void require_this_engine(const io::LogReader& log, const std::string& what_else_to_do = "");
+/// Refuses logs of other engines and, unless `any_revision`, of other revisions (UsageError).
+void require_this_engine(const io::LogReader& log, const std::string& what_else_to_do = "",
+                         bool any_revision = false);
 
 }  // namespace varve::tools

@@ -146,6 +146,10 @@ TEST_F(Fork, FindsItsParentByIdAndCopiesItOnRequest) {
   EXPECT_EQ(chain_at(folder_ / "apart/detached", 10), chain_at(parent_, 10));
   fs::rename(folder_ / "apart/parent.varve", folder_ / "apart/renamed");
   EXPECT_EQ(chain_at(child, 10), chain_at(parent_, 10));
+  const std::string heir = fork_of(parent_, "50", "heir", {"--damping", "0.3"});
+  fs::create_directory(folder_ / "far");
+  fork_of(heir, "70", "far/grandchild", {"--detach"});
+  EXPECT_EQ(chain_at(folder_ / "far/grandchild", 10), chain_at(parent_, 10));
 }
 
 TEST_F(Fork, FromATornParent) {

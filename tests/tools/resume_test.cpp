@@ -93,6 +93,24 @@ TEST_F(Resume, CutsATornTailAndSaysSo) {
   expect_equal_to_whole(run);
 }
 
+TEST_F(Resume, RefusesRotAndTouchesNothing) {
+  const std::string run = folder_ / "rotten";
+  fs::copy_file(folder_ / "whole", run);
+  {
+    std::fstream file(run, std::ios::in | std::ios::out | std::ios::binary);
+    file.seekp(static_cast<std::streamoff>(fs::file_size(run) / 2));
+    file.put('\x5a').put('\xa5').put('\x5a');
+  }
+  std::ifstream before(run, std::ios::binary);
+  const std::string bytes(std::istreambuf_iterator<char>(before), {});
+  verb(4, {"resume", run, "--steps", "5"});
+  std::ifstream after(run, std::ios::binary);
+  EXPECT_EQ(std::string(std::istreambuf_iterator<char>(after), {}), bytes);
+  // What lies before the damage can still be forked.
+  verb(0, {"fork", run, "--at", "10", "--steps", "110", "-o", folder_ / "child"});
+  EXPECT_EQ(chain_at(folder_ / "child", 120), chain_at(folder_ / "whole", 120));
+}
+
 TEST_F(Resume, AtItsEndSaysSoAndChangesNothing) {
   const auto size = fs::file_size(folder_ / "whole");
   const CommandResult result = verb(0, {"resume", folder_ / "whole"});

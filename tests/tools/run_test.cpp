@@ -77,6 +77,8 @@ TEST(Run, RefusesWithoutHarm) {
   EXPECT_NE(exists.errors.find(taken), std::string::npos) << exists.errors;
   EXPECT_EQ(fs::file_size(taken), 23u);
   verb(0, {"run", scene, "-o", taken, "--steps", "1", "--overwrite"});
+  verb(2, {"run", scene, "-o", scene, "--steps", "1", "--overwrite"});
+  EXPECT_EQ(fs::file_size(scene), disc_scene().size());
   verb(2, {"run", folder / "missing.cfg"});
   verb(2, {"run", folder.path()});
   verb(2, {"run", scene, "-o", folder.path()});
@@ -107,6 +109,17 @@ TEST(Run, NumericalFailureKeepsTheLogUpToTheLastGoodStep) {
       << result.errors;
   verb(0, {"verify", folder / "fast"});
   verb(0, {"replay", folder / "fast"});
+}
+
+TEST(Run, AnImpossibleScheduledChangeIsAFailureToo) {
+  TemporaryFolder folder;
+  const std::string scene = folder.write(
+      "crowd.cfg", crowd_scene("[event.squeeze]\nat_step = 20\ndomain.width = 6 mm\n"));
+  const CommandResult result = verb(5, {"run", scene, "-o", folder / "squeezed", "--json"});
+  EXPECT_EQ(whole(Json::parse(result.output)["last_step"]), 19u);
+  EXPECT_NE(result.errors.find("scheduled change"), std::string::npos) << result.errors;
+  verb(0, {"verify", folder / "squeezed"});
+  verb(0, {"replay", folder / "squeezed"});
 }
 
 TEST(Run, AFullDiskEndsWith74AndNamesTheLastDurableStep) {
