@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include <Eigen/Geometry>
-
 #include "core/simulation.h"
 
 namespace varve::core {
@@ -30,13 +28,6 @@ Vec<double, 2> spin_velocity(const Vec<double, 1>& spin, const Vec<double, 2>& a
 /// Torque of a force at arm r: r x f.
 Vec<double, 1> torque(const Vec<double, 2>& arm, const Vec<double, 2>& force) {
   return Vec<double, 1>(arm[0] * force[1] - arm[1] * force[0]);
-}
-
-Vec<double, 3> spin_velocity(const Vec<double, 3>& spin, const Vec<double, 3>& arm) {
-  return spin.cross(arm);
-}
-Vec<double, 3> torque(const Vec<double, 3>& arm, const Vec<double, 3>& force) {
-  return arm.cross(force);
 }
 
 template <int D, class Position>

@@ -94,7 +94,7 @@ template <class Visit>
 void CellGrid<D, Position>::around(const Vec<Position, D>& point, Visit&& visit) const {
   // Along a periodic axis of one or two cells the neighbours repeat; each is visited once.
   std::int64_t cells[D][3] = {};
-  int counts[D];
+  int counts[D] = {};
   for (int a = 0; a < D; ++a) {
     const std::int64_t middle = cell_along(static_cast<double>(point[a]), a);
     counts[a] = 0;
