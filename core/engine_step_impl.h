@@ -363,7 +363,7 @@ void Engine<D, P>::report_fluid(std::size_t a) const {
   if (!(std::abs(deviation) <= scenario_.guards.density_deviation))
     throw NumericalFailure("density deviation", step, "fluid.superficial_density", id, deviation,
                            scenario_.guards.density_deviation,
-                           "lower time.cfl, raise coupling.porosity_floor or fluid.sound_speed");
+                           "raise coupling.length or coupling.porosity_floor, or lower time.cfl");
   double speed2 = 0;
   for (int k = 0; k < D; ++k) {
     const auto v = static_cast<double>(next_.fluid.velocity[a][k]);
