@@ -276,22 +276,28 @@ VARVE_INLINE U length_of(U magnitude) {
 }
 
 template <class T>
-VARVE_INLINE void symbolise_body(const ImageOf<T>* residuals, const Expectation* expected,
-                                 std::size_t n, std::uint8_t* symbols) {
+VARVE_INLINE void tokenise_body(ImageOf<T>* residuals, const Expectation* expected, std::size_t n,
+                                Token* tokens) {
   using U = ImageOf<T>;
   alignas(64) std::uint32_t code[block_values];  // length and sign
   for (std::size_t i = 0; i < n; ++i) {
     const U sign = residuals[i] >> (sizeof(U) * 8 - 1);
-    const U length = length_of<U>((residuals[i] ^ (U{0} - sign)) + sign);
+    const U magnitude = (residuals[i] ^ (U{0} - sign)) + sign;
+    const U length = length_of<U>(magnitude);
+    const U nonzero = magnitude != 0 ? 1 : 0;
     code[i] = static_cast<std::uint32_t>(length * 2 + sign);
+    residuals[i] = magnitude ^ (nonzero << (length - nonzero));
   }
   for (std::size_t i = 0; i < n; ++i) {
     const std::uint32_t length = code[i] >> 1;
-    const std::uint32_t offset = expected[i].offset;
-    const std::uint32_t agree = length == 0 ? 0 : (code[i] & 1) ^ (expected[i].context >> 7);
-    const std::uint32_t symbol = (length - offset) * 2 + agree;  // huge where length < offset
-    const bool fits = (length > offset || (offset == 0 && length == 0)) && symbol < tans_symbols;
-    symbols[i] = static_cast<std::uint8_t>(fits ? symbol : tans_escape);
+    const std::uint32_t sign = code[i] & 1;
+    const std::uint32_t nonzero = length != 0 ? 1 : 0;
+    const std::uint32_t disagree = sign ^ (expected[i].context >> 7);
+    const std::uint32_t symbol = (length - expected[i].offset) * 2 + disagree;
+    const bool fits = length > expected[i].offset && symbol < tans_symbols;
+    const std::uint32_t written = fits ? symbol : tans_escape;
+    tokens[i].symbol = static_cast<std::uint8_t>(nonzero != 0 ? written : 0);
+    tokens[i].shape = static_cast<std::uint8_t>((length - nonzero) | nonzero << 6 | sign << 7);
   }
 }
 
@@ -338,9 +344,9 @@ VARVE_INLINE void symbolise_body(const ImageOf<T>* residuals, const Expectation*
         look_back_body<T>(newest, differences, weights, order, n, residual);                      \
       }                                                                                           \
     }                                                                                             \
-    TARGET static void symbolise(const U* residuals, const Expectation* expected, std::size_t n,  \
-                                 std::uint8_t* symbols) {                                         \
-      symbolise_body<T>(residuals, expected, n, symbols);                                         \
+    TARGET static void tokenise(U* residuals, const Expectation* expected, std::size_t n,         \
+                                Token* tokens) {                                                  \
+      tokenise_body<T>(residuals, expected, n, tokens);                                           \
     }                                                                                             \
     TARGET static void subtract(const U* bits, const U* predicted, std::size_t n, U* residuals) { \
       for (std::size_t i = 0; i < n; ++i) {                                                       \
@@ -353,7 +359,7 @@ VARVE_INLINE void symbolise_body(const ImageOf<T>* residuals, const Expectation*
       }                                                                                           \
     }                                                                                             \
     static constexpr Kernels<T> table{gather, scatter, predict, fold,      unfold,     subtract,  \
-                                      add,    expect,  learn,   look_back, symbolise,  advance};  \
+                                      add,    expect,  learn,   look_back, tokenise,   advance};  \
   };
 
 // Integers have no second stage.

@@ -17,7 +17,13 @@ inline constexpr std::size_t block_values = 1024;
 /// What is known of a residual before it is read (codec_tans.h).
 struct Expectation {
   std::uint8_t context;  ///< class of level and of its last change; bit 7: sign of the one before
-  std::uint8_t offset;   ///< bits of a residual whose symbol is 0 or 1
+  std::uint8_t offset;   ///< bits that every residual has besides those of its symbol, unless it is 0
+};
+
+/// How a residual is written (codec_tans.h).
+struct Token {
+  std::uint8_t symbol;
+  std::uint8_t shape;  ///< raw bits behind the symbol; bit 6: not 0; bit 7: negative
 };
 
 /// Symbols of the entropy coder; the one behind which length and sign follow as they are.
@@ -65,9 +71,9 @@ struct Kernels {
   /// from the differences behind it, in units in the last place of newest[i].
   void (*look_back)(const U* newest, const T* const* differences, const T* weights, unsigned order,
                     std::size_t n, float* residual);
-  /// Symbols (codec_tans.h) of residuals, which are two's complement, under these expectations.
-  void (*symbolise)(const U* residuals, const Expectation* expected, std::size_t n,
-                    std::uint8_t* symbols);
+  /// Tokens of residuals, which are two's complement, under these expectations. Each residual is
+  /// replaced by its raw bits: the magnitude without its highest bit.
+  void (*tokenise)(U* residuals, const Expectation* expected, std::size_t n, Token* tokens);
   /// difference[i] = bits[i] - newest[i] as values; newest[i] = bits[i].
   void (*advance)(const U* bits, U* newest, T* difference, std::size_t n);
 };

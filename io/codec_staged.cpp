@@ -58,7 +58,7 @@ void StagedCoder<T>::encode(Track<T>& track, std::span<const std::byte> frame,
   }
   residuals_.resize(track.values());
   expected_.resize(track.values());
-  symbols_.resize(track.values());
+  tokens_.resize(track.values());
   track.begin_frame();
   track.for_blocks([&](std::size_t first, std::size_t n) {
     std::array<U, block_values> bits;
@@ -70,8 +70,7 @@ void StagedCoder<T>::encode(Track<T>& track, std::span<const std::byte> frame,
     kernel.expect(block, base.data(), n, predicted.data(), expected_.data() + first);
     track.gather(frame, first, n, bits.data());
     kernel.subtract(bits.data(), predicted.data(), n, residuals_.data() + first);
-    kernel.symbolise(residuals_.data() + first, expected_.data() + first, n,
-                     symbols_.data() + first);
+    kernel.tokenise(residuals_.data() + first, expected_.data() + first, n, tokens_.data() + first);
     kernel.learn(block, bits.data(), base.data(), n);
     track.advance(bits.data(), first, n);
   });
@@ -92,7 +91,7 @@ void StagedCoder<T>::encode(Track<T>& track, std::span<const std::byte> frame,
     sink.bytes(description_);
     encoder_.set_model(model_);
   }
-  encoder_.encode(residuals_, expected_, symbols_, track.count(), payload);
+  encoder_.encode(residuals_, expected_, tokens_, track.count(), payload);
 }
 
 template <class T>
@@ -150,11 +149,11 @@ void StagedCoder<T>::decode(Track<T>& track, ByteSource& source, const Weights& 
 /// true if that saves more than its description costs.
 template <class T>
 bool StagedCoder<T>::improve_model(bool fresh) {
-  const std::size_t stride = std::max<std::size_t>(1, symbols_.size() / count_values) | 1;
-  for (std::size_t i = 0; i < symbols_.size(); i += stride) {
-    ++counts_[expected_[i].context & 0x7f][symbols_[i]];
+  const std::size_t stride = std::max<std::size_t>(1, tokens_.size() / count_values) | 1;
+  for (std::size_t i = 0; i < tokens_.size(); i += stride) {
+    ++counts_[expected_[i].context & 0x7f][tokens_[i].symbol];
   }
-  counted_ += symbols_.size() / stride;
+  counted_ += tokens_.size() / stride;
   if (!fresh && ++frames_since_model_ < frames_to_model_) {
     return false;
   }
@@ -167,7 +166,7 @@ bool StagedCoder<T>::improve_model(bool fresh) {
   better.write(sink);
   const double saved_per_symbol =
       (model_.cost(counts_) - better.cost(counts_)) / static_cast<double>(counted_);
-  const double saved = saved_per_symbol * static_cast<double>(symbols_.size() * model_interval);
+  const double saved = saved_per_symbol * static_cast<double>(tokens_.size() * model_interval);
   for (auto& context : counts_) {
     for (std::uint32_t& count : context) {
       count /= 2;

@@ -49,9 +49,9 @@ class StagedCoder {
   SymbolCounts counts_{};
   std::size_t counted_ = 0;
   std::vector<std::byte> description_;
-  std::vector<U> residuals_;
+  std::vector<U> residuals_;  ///< their raw bits, once they are tokens
   std::vector<Expectation> expected_;
-  std::vector<std::uint8_t> symbols_;
+  std::vector<Token> tokens_;
 };
 
 }  // namespace varve::io::codec

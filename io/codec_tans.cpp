@@ -180,21 +180,20 @@ void Model::read(ByteSource& source) {
 
 struct EncodeTables {
   struct Step {
-    std::uint32_t delta_bits = 0;  ///< (state + delta_bits) >> 16 is the number of bits to emit
+    std::uint32_t delta_bits = escaped;  ///< (state + delta_bits) >> 16: number of bits to emit
     std::int32_t delta_state = 0;
   };
-  std::array<std::array<Step, tans_symbols>, tans_contexts> step;
+  /// Marks symbols without a slot, and the escape itself, whose step comes behind all symbols'.
+  static constexpr std::uint32_t escaped = ~0u;
+  std::array<std::array<Step, tans_symbols + 1>, tans_contexts> step;
   std::array<std::array<std::uint16_t, tans_states>, tans_contexts> next;
-  std::array<std::uint32_t, tans_contexts> possible{};  ///< bit s: symbol s has a slot
 };
 
 struct DecodeTables {
-  struct Step {
-    std::uint16_t base;
-    std::uint8_t bits;
-    std::uint8_t symbol;
-  };
-  std::array<std::array<Step, tans_states>, tans_contexts> step;
+  /// What a state says: packed, since one load is all there is time for.
+  /// Bits 0-9: base of the next state; 10-13: bits to add to it; 16-20: raw bits besides the offset;
+  /// 24: the residual is not 0; 25: its sign is not the expected one; 26: escape.
+  std::array<std::array<std::uint32_t, tans_states>, tans_contexts> step;
 };
 
 namespace {
@@ -205,17 +204,16 @@ void build(const Model& model, EncodeTables& tables) {
     const auto owner = spread(slots);
     std::array<std::uint32_t, tans_symbols> first{};
     std::uint32_t sum = 0;
-    tables.possible[c] = 0;
+    tables.step[c].fill({});
     for (unsigned s = 0; s < tans_symbols; ++s) {
       first[s] = sum;
       if (slots[s] > 0) {
         // A state emits `bits` bits from slots << bits upwards, one less below.
         const auto width = static_cast<unsigned>(std::bit_width(slots[s] - 1u));
         const unsigned bits = slots[s] == 1 ? tans_log : tans_log + 1 - width;
-        tables.step[c][s].delta_bits =
-            (bits << 16) - (static_cast<std::uint32_t>(slots[s]) << bits);
-        tables.step[c][s].delta_state = static_cast<std::int32_t>(sum) - slots[s];
-        tables.possible[c] |= 1u << s;
+        EncodeTables::Step& step = tables.step[c][s == tans_escape ? tans_symbols : s];
+        step.delta_bits = (bits << 16) - (static_cast<std::uint32_t>(slots[s]) << bits);
+        step.delta_state = static_cast<std::int32_t>(sum) - slots[s];
       }
       sum += slots[s];
     }
@@ -234,8 +232,11 @@ void build(const Model& model, DecodeTables& tables) {
       const unsigned symbol = owner[state];
       const unsigned x = next[symbol]++;
       const unsigned bits = tans_log + 1 - static_cast<unsigned>(std::bit_width(x));
-      tables.step[c][state] = {static_cast<std::uint16_t>((x << bits) - tans_states),
-                               static_cast<std::uint8_t>(bits), static_cast<std::uint8_t>(symbol)};
+      const unsigned length = symbol / 2;
+      const unsigned raw = length == 0 ? 0 : length - 1;
+      tables.step[c][state] = ((x << bits) - tans_states) | bits << 10 | raw << 16 |
+                              (length != 0 ? 1u << 24 : 0) | (symbol & 1) << 25 |
+                              (symbol == tans_escape ? 1u << 26 : 0);
     }
   }
 }
@@ -260,51 +261,48 @@ using Writers = std::array<BackwardWriter, tans_streams>;
 
 /// One value: raw bits first, then what an escape needs, then state bits, since all is read
 /// backwards.
-template <class U>
-VARVE_INLINE void put_value(const EncodeTables& tables, U residual, Expectation expected,
-                            unsigned symbol, BackwardWriter& writer) {
+VARVE_INLINE void put_value(const EncodeTables& tables, std::uint64_t raw_bits,
+                            Expectation expected, Token token, BackwardWriter& writer) {
   constexpr unsigned combined_max = 46;  // raw bits that fit into one put() with the state's
   const unsigned context = expected.context & 0x7f;
-  const U sign = residual >> (sizeof(U) * 8 - 1);
-  const U magnitude = (residual ^ (U{0} - sign)) + sign;
-  const unsigned length = bit_length(magnitude);
-  const unsigned raw = length - (length != 0);
-  const std::uint64_t raw_bits = low_bits(magnitude, raw);
-  const bool escaped = (tables.possible[context] >> symbol & 1) == 0 || symbol == tans_escape;
-  const bool apart = escaped || raw > combined_max;
-  if (apart) [[unlikely]] {
+  unsigned raw = token.shape & 0x3f;
+  EncodeTables::Step step = tables.step[context][token.symbol];
+  const bool escaped = step.delta_bits == EncodeTables::escaped;
+  if (escaped || raw > combined_max) [[unlikely]] {
     if (raw > 32) {
       writer.put(raw_bits >> 32, raw - 32);
     }
     writer.put(raw_bits & 0xffffffffu, std::min(raw, 32u));
     if (escaped) {
-      symbol = tans_escape;
-      writer.put(length * 2 + static_cast<unsigned>(sign), 8);
+      const unsigned length = raw + (token.shape >> 6 & 1);
+      writer.put(length * 2 + (token.shape >> 7), 8);
+      step = tables.step[context][tans_symbols];
     }
+    raw = 0;
+    raw_bits = 0;
   }
-  const EncodeTables::Step step = tables.step[context][symbol];
   const unsigned bits = (writer.state + step.delta_bits) >> 16;
   const std::uint64_t state_bits = low_bits(writer.state, bits);
   const auto index = static_cast<std::int32_t>(writer.state >> bits) + step.delta_state;
   writer.state = tables.next[context][static_cast<std::size_t>(index)];
-  writer.put(apart ? state_bits : (raw_bits << bits) | state_bits, apart ? bits : raw + bits);
+  writer.put((raw_bits << bits) | state_bits, raw + bits);
 }
 
 template <class U>
-VARVE_INLINE void put_run_body(const EncodeTables& tables, const U* residuals,
-                               const Expectation* expected, const std::uint8_t* symbols,
-                               std::size_t n, Writers& all) {
+VARVE_INLINE void put_run_body(const EncodeTables& tables, const U* raw_bits,
+                               const Expectation* expected, const Token* tokens, std::size_t n,
+                               Writers& all) {
   BackwardWriter w0 = all[0], w1 = all[1], w2 = all[2], w3 = all[3];
   std::size_t i = n;
   for (; i % tans_streams != 0; --i) {
     BackwardWriter& writer = i % tans_streams == 3 ? w2 : i % tans_streams == 2 ? w1 : w0;
-    put_value(tables, residuals[i - 1], expected[i - 1], symbols[i - 1], writer);
+    put_value(tables, raw_bits[i - 1], expected[i - 1], tokens[i - 1], writer);
   }
   for (; i > 0; i -= tans_streams) {
-    put_value(tables, residuals[i - 1], expected[i - 1], symbols[i - 1], w3);
-    put_value(tables, residuals[i - 2], expected[i - 2], symbols[i - 2], w2);
-    put_value(tables, residuals[i - 3], expected[i - 3], symbols[i - 3], w1);
-    put_value(tables, residuals[i - 4], expected[i - 4], symbols[i - 4], w0);
+    put_value(tables, raw_bits[i - 1], expected[i - 1], tokens[i - 1], w3);
+    put_value(tables, raw_bits[i - 2], expected[i - 2], tokens[i - 2], w2);
+    put_value(tables, raw_bits[i - 3], expected[i - 3], tokens[i - 3], w1);
+    put_value(tables, raw_bits[i - 4], expected[i - 4], tokens[i - 4], w0);
   }
   all = {w0, w1, w2, w3};
 }
@@ -319,29 +317,33 @@ template <class U>
 VARVE_INLINE U take_value(const DecodeTables& tables, const std::byte* data, Expectation expected,
                           BitReader& reader) {
   constexpr unsigned window_raw_max = 40;  // of 57 bits in a window: 9 of the state, 8 of an escape
-  const DecodeTables::Step step = tables.step[expected.context & 0x7f][reader.state];
+  const std::uint32_t step = tables.step[expected.context & 0x7f][reader.state];
   std::uint64_t window = load64(data + (reader.bit >> 3)) >> (reader.bit & 7);
-  reader.state = step.base + static_cast<std::uint32_t>(low_bits(window, step.bits));
-  window >>= step.bits;
-  std::uint64_t at = reader.bit + step.bits;
-  unsigned length = (step.symbol >> 1) + expected.offset;
-  unsigned negative = (step.symbol & 1u) ^ (expected.context >> 7);
-  if (step.symbol == tans_escape) [[unlikely]] {
-    length = static_cast<unsigned>(window & 0xff) >> 1;
+  const unsigned bits = step >> 10 & 15;
+  reader.state = (step & 1023) + static_cast<std::uint32_t>(low_bits(window, bits));
+  window >>= bits;
+  std::uint64_t at = reader.bit + bits;
+  std::uint64_t nonzero = step >> 24 & 1;
+  unsigned negative = (step >> 25 & 1) ^ (expected.context >> 7);
+  // The offset counts only behind symbols of residuals that are not 0.
+  unsigned raw = (step >> 16 & 31) + (expected.offset & (0u - static_cast<unsigned>(nonzero)));
+  if ((step >> 26 & 1) != 0) [[unlikely]] {
+    const unsigned length = static_cast<unsigned>(window & 0xff) >> 1;
     negative = static_cast<unsigned>(window & 1);
+    nonzero = length != 0 ? 1 : 0;
+    raw = length - static_cast<unsigned>(nonzero);
     at += 8;
     window >>= 8;
   }
-  const unsigned raw = (length - (length != 0)) & 63;
-  std::uint64_t bits = low_bits(window, raw);
+  raw &= 63;
+  std::uint64_t low = low_bits(window, raw);
   if (raw > window_raw_max) [[unlikely]] {
-    const std::uint64_t low = load64(data + (at >> 3)) >> (at & 7);
-    const std::uint64_t high = load64(data + ((at + 32) >> 3)) >> (at & 7);
-    bits = (low & 0xffffffffu) | (low_bits(high, raw - 32) << 32);
+    const std::uint64_t first = load64(data + (at >> 3)) >> (at & 7);
+    const std::uint64_t second = load64(data + ((at + 32) >> 3)) >> (at & 7);
+    low = (first & 0xffffffffu) | (low_bits(second, raw - 32) << 32);
   }
   reader.bit = at + raw;
-  const auto magnitude =
-      static_cast<U>(bits | (static_cast<std::uint64_t>(length != 0) << raw));
+  const auto magnitude = static_cast<U>(low | (nonzero << raw));
   const U mask = U{0} - static_cast<U>(negative);
   return (magnitude ^ mask) - mask;
 }
@@ -367,7 +369,7 @@ VARVE_INLINE bool take_rows_body(const DecodeTables& tables, const std::byte* da
 }
 
 template <class U>
-using PutRun = void (*)(const EncodeTables&, const U*, const Expectation*, const std::uint8_t*,
+using PutRun = void (*)(const EncodeTables&, const U*, const Expectation*, const Token*,
                         std::size_t, Writers&);
 template <class U>
 using TakeRows = bool (*)(const DecodeTables&, const std::byte*, const Expectation*, std::size_t,
@@ -376,10 +378,10 @@ using TakeRows = bool (*)(const DecodeTables&, const std::byte*, const Expectati
 #define VARVE_TANS_SET(NAME, TARGET)                                                              \
   template <class U>                                                                              \
   struct NAME {                                                                                   \
-    TARGET static void put_run(const EncodeTables& tables, const U* residuals,                    \
-                               const Expectation* expected, const std::uint8_t* symbols,          \
-                               std::size_t n, Writers& writers) {                                 \
-      put_run_body<U>(tables, residuals, expected, symbols, n, writers);                          \
+    TARGET static void put_run(const EncodeTables& tables, const U* raw_bits,                     \
+                               const Expectation* expected, const Token* tokens, std::size_t n,   \
+                               Writers& writers) {                                                \
+      put_run_body<U>(tables, raw_bits, expected, tokens, n, writers);                            \
     }                                                                                             \
     TARGET static bool take_rows(const DecodeTables& tables, const std::byte* data,               \
                                  const Expectation* expected, std::size_t n,                      \
@@ -440,12 +442,12 @@ void TansEncoder<U>::set_model(const Model& model) {
 }
 
 template <class U>
-void TansEncoder<U>::encode(std::span<const U> residuals, std::span<const Expectation> expected,
-                            std::span<const std::uint8_t> symbols, std::size_t run,
+void TansEncoder<U>::encode(std::span<const U> raw_bits, std::span<const Expectation> expected,
+                            std::span<const Token> tokens, std::size_t run,
                             std::vector<std::byte>& out) {
   constexpr std::size_t value_bytes_max = 11;  // 9 state bits, 8 of an escape, 63 raw ones
   Writers writers;
-  const std::size_t runs = run == 0 ? 0 : residuals.size() / run;
+  const std::size_t runs = run == 0 ? 0 : raw_bits.size() / run;
   const std::size_t values_max = runs * (run / tans_streams + 1);
   const std::size_t room = values_max * value_bytes_max + 16;
   if (buffer_size_ < tans_streams * room) {
@@ -456,8 +458,8 @@ void TansEncoder<U>::encode(std::span<const U> residuals, std::span<const Expect
     writers[k].at = buffer_.get() + (k + 1) * room;
   }
   for (std::size_t r = runs; r-- > 0;) {
-    put_run<U>()(*tables_, residuals.data() + r * run, expected.data() + r * run,
-                 symbols.data() + r * run, run, writers);
+    put_run<U>()(*tables_, raw_bits.data() + r * run, expected.data() + r * run,
+                 tokens.data() + r * run, run, writers);
   }
   std::array<std::size_t, tans_streams> sizes{};
   std::size_t sum = 0;

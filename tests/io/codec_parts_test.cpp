@@ -131,7 +131,7 @@ std::vector<std::byte> run_kernels(const Kernels<T>& kernel, std::uint64_t seed,
   }
   std::vector<U> image(n), folded(n), back(n), predicted(n), residuals(n);
   std::vector<Expectation> expected(n);
-  std::vector<std::uint8_t> symbols(n);
+  std::vector<Token> tokens(n);
   std::vector<T> difference(n);
   for (const unsigned order : {0u, 1u, 2u, 3u, 7u, 12u}) {
     kernel.predict(newest.data(), differences.data(), weights.data(), order, n, image.data());
@@ -176,8 +176,12 @@ std::vector<std::byte> run_kernels(const Kernels<T>& kernel, std::uint64_t seed,
       result.push_back(static_cast<std::byte>(known.offset));
     }
     kernel.subtract(bits.data(), predicted.data(), n, residuals.data());
-    kernel.symbolise(residuals.data(), expected.data(), n, symbols.data());
-    keep(symbols);
+    kernel.tokenise(residuals.data(), expected.data(), n, tokens.data());
+    keep(residuals);
+    for (const Token& token : tokens) {
+      result.push_back(static_cast<std::byte>(token.symbol));
+      result.push_back(static_cast<std::byte>(token.shape));
+    }
     kernel.learn(block, bits.data(), image.data(), n);
     keep(past[3]);
     for (const auto& level : levels) {
@@ -247,7 +251,7 @@ void code_and_decode(std::uint64_t seed) {
   const std::size_t runs = 1 + random() % 3;
   std::vector<U> residuals(run * runs);
   std::vector<Expectation> expected(residuals.size());
-  std::vector<std::uint8_t> symbols(residuals.size());
+  std::vector<Token> tokens(residuals.size());
   const unsigned spread = 1 + static_cast<unsigned>(random() % 64);
   for (std::size_t i = 0; i < residuals.size(); ++i) {
     residuals[i] = static_cast<U>(random() >> (random() % spread));
@@ -257,20 +261,21 @@ void code_and_decode(std::uint64_t seed) {
     expected[i].offset = static_cast<std::uint8_t>(random() % 3 == 0 ? random() % 50 : 0);
   }
   using T = std::conditional_t<sizeof(U) == 8, double, float>;
+  std::vector<U> raw_bits = residuals;
   for (std::size_t at = 0; at < residuals.size(); at += block_values) {
     const std::size_t n = std::min(block_values, residuals.size() - at);
-    kernels<T>().symbolise(residuals.data() + at, expected.data() + at, n, symbols.data() + at);
+    kernels<T>().tokenise(raw_bits.data() + at, expected.data() + at, n, tokens.data() + at);
   }
   SymbolCounts counts{};
   for (std::size_t i = 0; i < residuals.size(); i += 2) {
-    ++counts[expected[i].context & 0x7f][symbols[i]];
+    ++counts[expected[i].context & 0x7f][tokens[i].symbol];
   }
   Model model;
   model.fit(counts);
   TansEncoder<U> encoder;
   encoder.set_model(model);
   std::vector<std::byte> bytes;
-  encoder.encode(residuals, expected, symbols, run, bytes);
+  encoder.encode(raw_bits, expected, tokens, run, bytes);
   TansDecoder<U> decoder;
   decoder.set_model(model);
   const std::string name = "f";

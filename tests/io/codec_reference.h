@@ -375,7 +375,7 @@ class ReferenceField {
 
     const Slot slot = models_[static_cast<std::size_t>(5 * height + trend)][stream.state];
     stream.state = slot.base + static_cast<unsigned>(stream.take(slot.bits));
-    std::uint64_t length = slot.symbol / 2 + static_cast<unsigned>(offset);
+    std::uint64_t length = slot.symbol == 0 ? 0 : slot.symbol / 2 + static_cast<unsigned>(offset);
     bool negative = (slot.symbol % 2 == 1) != negative_before;
     if (slot.symbol == 1) {
       const std::uint64_t plain = stream.take(8);
