@@ -17,7 +17,8 @@ inline constexpr std::size_t block_values = 1024;
 /// What is known of a residual before it is read (codec_tans.h).
 struct Expectation {
   std::uint8_t context;  ///< class of level and of its last change; bit 7: sign of the one before
-  std::uint8_t offset;   ///< bits that every residual has besides those of its symbol, unless it is 0
+  /// Bits that every residual has besides those of its symbol, unless it is 0.
+  std::uint8_t offset;
 };
 
 /// How a residual is written (codec_tans.h).
