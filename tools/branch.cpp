@@ -182,6 +182,85 @@ void check_settings(const core::Scenario& now, const Settings& settings,
   if (!reasons.empty()) throw UsageError(reasons);
 }
 
+namespace {
+
+/// A request's settings, sorted by how they are made.
+struct Plan {
+  Changes changes;                     ///< those that change anything, for the lineage
+  Settings at_once;                    ///< made by the engine at step K
+  core::Scenario outputs;              ///< holds the new values of keys that touch no state
+  std::optional<double> ramped_width;  ///< [m] reached by scheduled jumps
+};
+
+Plan plan_changes(const core::Scenario& before, const BranchRequest& request) {
+  Plan plan;
+  plan.outputs = before;
+  bool new_width = false;
+  for (const auto& [key, value] : request.settings) {
+    core::Scenario scratch = before;
+    core::set_parameter(scratch, *core::find_parameter(key), value);
+    const std::string from = text_of(before, key), to = text_of(scratch, key);
+    if (from == to) continue;
+    plan.changes.push_back({key, from, to});
+    new_width = new_width || key == "domain.width";
+    if (is_output(key)) {
+      core::set_parameter(plan.outputs, *core::find_parameter(key), value);
+    } else if (key == "domain.width" && request.ramp_time) {
+      plan.ramped_width = scratch.domain.width;
+    } else {
+      plan.at_once.emplace_back(key, to);
+    }
+  }
+  if (request.ramp_time && !plan.ramped_width)
+    throw UsageError("--ramp-time: the width does not change; give another --width");
+  const core::ChangeOptions& options = request.options;
+  if (new_width && options.anchor != 0)
+    plan.changes.push_back({"fork.anchor", "both", options.anchor < 0 ? "left" : "right"});
+  if (new_width && options.outside != core::OutsideMode::error)
+    plan.changes.push_back({"fork.outside", "error",
+                            options.outside == core::OutsideMode::push ? "push" : "remove"});
+  if (plan.ramped_width)
+    plan.changes.push_back({"fork.ramp_time", "0", core::number_text(*request.ramp_time)});
+  return plan;
+}
+
+/// Shifts the grains of the branch's first state and says so in its events and changes.
+void perturb_first(Branch& branch, Changes& changes, const io::Schema& schema,
+                   const BranchRequest& request) {
+  const std::uint64_t moved = perturb_grains(schema, branch.first, request.perturb, request.seed);
+  const std::string amplitude = core::number_text(request.perturb);
+  const std::string seed = std::to_string(request.seed);
+  branch.events.push_back({request.step,
+                           "perturb",
+                           {{"amplitude_m", amplitude},
+                            {"seed", seed},
+                            {"grains_moved", std::to_string(moved)}}});
+  changes.push_back({"fork.perturb", "0", amplitude + " seed " + seed});
+  if (moved == 0)
+    branch.notes.push_back(
+        "warning: --perturb is below the resolution of the positions: no grain moved");
+}
+
+/// What the parent recorded of step K itself happened before the change: the child keeps it, in
+/// those tables that both have.
+void take_tables(Branch& branch, const io::LogReader& parent, std::uint64_t step) {
+  const std::vector<io::TableDescriptor>& ours = branch.genesis.schema.tables;
+  const std::vector<io::TableDescriptor>& theirs = parent.genesis().schema.tables;
+  const auto recorded = parent.tables(step);
+  branch.first.rows.assign(ours.size(), 0);
+  branch.first.tables.clear();
+  for (std::size_t t = 0; t < ours.size(); ++t) {
+    branch.first.tables.emplace_back(ours[t].columns.size());
+    const auto same = std::find(theirs.begin(), theirs.end(), ours[t]);
+    const auto index = static_cast<std::size_t>(same - theirs.begin());
+    if (!recorded || index >= recorded->tables.size()) continue;
+    branch.first.rows[t] = recorded->rows[index];
+    branch.first.tables[t] = recorded->tables[index];
+  }
+}
+
+}  // namespace
+
 Branch make_branch(const io::LogReader& parent, const BranchRequest& request,
                    const core::RunOptions& run_options) {
   auto source = SimulationEngine::of_genesis(parent.genesis(), parent.path(), run_options);
@@ -190,80 +269,33 @@ Branch make_branch(const io::LogReader& parent, const BranchRequest& request,
   check_settings(before, request.settings, request.options);
 
   Branch branch;
-  Changes changes;
-  Settings at_once;
-  core::Scenario outputs = before;  // where the keys that touch no state are set
-  std::optional<double> ramped_width;
-  for (const auto& [key, value] : request.settings) {
-    core::Scenario scratch = before;
-    core::set_parameter(scratch, *core::find_parameter(key), value);
-    if (text_of(scratch, key) == text_of(before, key)) continue;  // no change
-    changes.push_back({key, text_of(before, key), text_of(scratch, key)});
-    if (is_output(key)) {
-      core::set_parameter(outputs, *core::find_parameter(key), value);
-    } else if (key == "domain.width" && request.ramp_time) {
-      ramped_width = scratch.domain.width;
-    } else {
-      at_once.emplace_back(key, text_of(scratch, key));
-    }
-  }
-  if (request.ramp_time && !ramped_width)
-    throw UsageError("--ramp-time: the width does not change; give another --width");
-  if (!at_once.empty()) {
+  Plan plan = plan_changes(before, request);
+  if (!plan.at_once.empty()) {
     const auto scheduled = static_cast<std::ptrdiff_t>(source->events().size());  // at this step
-    source->change(at_once, request.options);
+    source->change(plan.at_once, request.options);
     branch.events.assign(source->events().begin() + scheduled, source->events().end());
   }
   core::Scenario child = remaining(source->simulation().scenario(), request.step);
-  child.time.steps = outputs.time.steps;
-  child.time.until = outputs.time.until;
-  child.record = outputs.record;
-  const bool new_width = std::any_of(changes.begin(), changes.end(), [](const auto& change) {
-    return change.key == "domain.width";
-  });
-  if (new_width && request.options.anchor != 0)
-    changes.push_back({"fork.anchor", "both", request.options.anchor < 0 ? "left" : "right"});
-  if (new_width && request.options.outside != core::OutsideMode::error)
-    changes.push_back({"fork.outside", "error",
-                       request.options.outside == core::OutsideMode::push ? "push" : "remove"});
-  if (ramped_width) {
-    schedule_ramp(child, request.step, *ramped_width, *request.ramp_time, request.options);
-    changes.push_back({"fork.ramp_time", "0", core::number_text(*request.ramp_time)});
-  }
+  child.time.steps = plan.outputs.time.steps;
+  child.time.until = plan.outputs.time.until;
+  child.record = plan.outputs.record;
+  if (plan.ramped_width)
+    schedule_ramp(child, request.step, *plan.ramped_width, *request.ramp_time, request.options);
   set_target(child, parent, request, child.time.dt != before.time.dt);
 
   branch.first = io::Frame::copy_of(source->frame());
-  if (request.perturb > 0) {
-    const std::uint64_t moved =
-        perturb_grains(source->schema(), branch.first, request.perturb, request.seed);
-    const std::string amplitude = core::number_text(request.perturb);
-    const std::string seed = std::to_string(request.seed);
-    branch.events.push_back({request.step,
-                             "perturb",
-                             {{"amplitude_m", amplitude},
-                              {"seed", seed},
-                              {"grains_moved", std::to_string(moved)}}});
-    changes.push_back({"fork.perturb", "0", amplitude + " seed " + seed});
-    if (moved == 0)
-      branch.notes.push_back("warning: --perturb is below the resolution of the positions: no "
-                             "grain moved");
-  }
-  // What the parent recorded of step K itself happened before the change.
-  if (auto tables = parent.tables(request.step)) {
-    branch.first.rows = std::move(tables->rows);
-    branch.first.tables = std::move(tables->tables);
-  }
-
+  if (request.perturb > 0) perturb_first(branch, plan.changes, source->schema(), request);
   const std::uint32_t revision = parent.genesis().engine_revision;
   if (revision != core::engine_revision)
-    changes.push_back({"engine.revision", std::to_string(revision),
-                       std::to_string(core::engine_revision)});
-
-  branch.genesis = make_genesis(child, source->schema(), run_options.threads);
-  branch.genesis.lineage = make_lineage(parent, request.step, std::move(changes));
+    plan.changes.push_back({"engine.revision", std::to_string(revision),
+                            std::to_string(core::engine_revision)});
   // The child is run from what its log holds, as any later resume or replay of it.
+  branch.genesis = make_genesis(child, {}, run_options.threads);
   branch.engine = SimulationEngine::of_genesis(branch.genesis, parent.path(), run_options);
   branch.engine->restore(branch.first.view());
+  branch.genesis.schema = branch.engine->schema();
+  branch.genesis.lineage = make_lineage(parent, request.step, std::move(plan.changes));
+  take_tables(branch, parent, request.step);
   return branch;
 }
 

@@ -302,6 +302,19 @@ TEST_F(Fork, RefusesWithReasons) {
   expect_sound(parent_);
 }
 
+TEST_F(Fork, MayRecordMoreOrLessThanItsParent) {
+  for (const std::string setting :
+       {"record.stage_digests=on", "record.tier=digests", "record.every=5"}) {
+    const std::string child = fork_of(parent_, "40", "child-" + setting, {"-s", setting});
+    EXPECT_EQ(chain_at(child, 120), chain_at(parent_, 120)) << setting;
+    EXPECT_EQ(json_verb(0, {"diff", parent_, child})["verdict"], "identical") << setting;
+    expect_sound(child);
+    const std::string back = fork_of(child, "60", "back-" + setting,
+                                     {"-s", "record.stage_digests=off"});
+    EXPECT_EQ(chain_at(back, 120), chain_at(parent_, 120)) << setting;
+  }
+}
+
 TEST_F(Fork, ChangeWithoutEffectIsNoChange) {
   const std::string child = fork_of(parent_, "40", "child", {"--damping", "0.2"});
   EXPECT_TRUE(json_verb(0, {"info", child})["lineage"]["changes"].empty());
