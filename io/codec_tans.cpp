@@ -192,8 +192,7 @@ struct EncodeTables {
 struct DecodeTables {
   /// What a state says: packed, since one load is all there is time for.
   /// Bits 0-9: base of the next state; 10-13: bits to add to it; 16-20: raw bits besides the
-  /// offset;
-  /// 24: the residual is not 0; 25: its sign is not the expected one; 26: escape.
+  /// offset; 24: the residual is not 0; 25: its sign is not the expected one; 26: escape.
   std::array<std::array<std::uint32_t, tans_states>, tans_contexts> step;
 };
 
