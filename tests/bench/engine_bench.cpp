@@ -1,8 +1,7 @@
-// The engine alone: particle updates per second of CPU and of time, for every instruction set, for one
-// and more threads, and for every precision. All variants of a scene advance in turns of a few
-// steps, so that whatever else the machine does strikes them alike. What recording costs is
-// measured by varve_throughput.
-//   engine_bench [--rounds N] [--seconds S] [--scene NAME]
+// The engine alone: particle updates per second of CPU and of time, for every instruction set,
+// for one and more threads, and for every precision. All variants of a scene advance in turns of
+// a few steps, so that whatever else the machine does strikes them alike. What recording costs
+// is measured by varve_throughput. engine_bench [--rounds N] [--seconds S] [--scene NAME]
 #include <time.h>
 
 #include <algorithm>
