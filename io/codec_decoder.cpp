@@ -3,6 +3,7 @@
 #include "io/codec.h"
 #include "io/codec_bytes.h"
 #include "io/codec_dynamic.h"
+#include "io/codec_float_mode.h"
 #include "io/codec_identity.h"
 #include "io/codec_layout.h"
 #include "io/codec_method.h"
@@ -38,6 +39,7 @@ class Decoder final : public FrameDecoder {
     const bool history = whole_;
     whole_ = false;  // a record that fails half-way leaves no history to build on
     check(fields, keyframe, history);
+    const DefaultFloatMode mode;
     if (keyframe) {
       times_.clear();
     }

@@ -4,6 +4,7 @@
 #include "io/codec.h"
 #include "io/codec_bytes.h"
 #include "io/codec_dynamic.h"
+#include "io/codec_float_mode.h"
 #include "io/codec_identity.h"
 #include "io/codec_layout.h"
 #include "io/codec_method.h"
@@ -34,6 +35,7 @@ class Encoder final : public FrameEncoder {
 
   std::vector<EncodedField> encode(const FrameView& frame, bool& keyframe) override {
     check(frame);
+    const DefaultFloatMode mode;
     keyframe = restart_;
     restart_ = true;  // a frame that fails half-way leaves no history to build on
     if (keyframe) {

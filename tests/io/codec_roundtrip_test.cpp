@@ -1,9 +1,14 @@
 // Claims about the codec: every bit comes back, whatever the data and whatever the hints say.
 #include <gtest/gtest.h>
 
+#include <cfenv>
 #include <cmath>
 #include <limits>
 #include <random>
+
+#ifdef __SSE2__
+#include <xmmintrin.h>
+#endif
 
 #include "io/codec_method.h"
 #include "io/errors.h"
@@ -427,6 +432,39 @@ TEST(Codec, StillnessDoesNotExceedTheReadersRatio) {
   ASSERT_TRUE(link.same(frame));
   ASSERT_TRUE(link.same(frame));
   EXPECT_LT(payload_bytes(link.encoded), count / 100);
+}
+
+TEST(Codec, TheThreadsFloatModeReachesNoBit) {
+  Schema schema;
+  schema.fields = {field("v", "p", ScalarType::f64), field("f", "p", ScalarType::f32)};
+  auto encoder = FrameEncoder::create(schema);
+  auto decoder = FrameDecoder::create(schema);
+  for (int n = 0; n < 60; ++n) {
+    std::vector<double> v(500);
+    std::vector<float> f(500);
+    for (std::size_t i = 0; i < v.size(); ++i) {  // down to where values are subnormal
+      v[i] = std::sin(0.01 * n + static_cast<double>(i)) * std::pow(10.0, -static_cast<double>(i));
+      f[i] = static_cast<float>(v[i]);
+    }
+    Frame frame = empty_frame(schema);
+    frame.time = 0.01 * n;
+    set_values(frame, 0, 1, v);
+    set_values(frame, 1, 1, f);
+    bool keyframe = false;
+    std::fesetround(n % 2 == 0 ? FE_UPWARD : FE_DOWNWARD);
+#ifdef __SSE2__
+    const unsigned before = _mm_getcsr();
+    _mm_setcsr(before | 0x8040);  // results and operands that are subnormal count as zero
+#endif
+    const auto encoded = encoder->encode(frame.view(), keyframe);
+    EXPECT_EQ(std::fegetround(), n % 2 == 0 ? FE_UPWARD : FE_DOWNWARD) << "restored";
+#ifdef __SSE2__
+    _mm_setcsr(before);
+#endif
+    std::fesetround(FE_TONEAREST);
+    const Frame& back = decoder->decode(encoded, keyframe, 0, frame.time, frame.dt);
+    ASSERT_EQ(back.fields, frame.fields) << n;
+  }
 }
 
 TEST(Codec, FramesThatDoNotFitTheSchemaAreRefused) {
