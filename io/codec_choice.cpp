@@ -10,8 +10,8 @@ namespace varve::io::codec {
 namespace {
 
 /// Frames between two choices, choices between two fits.
-constexpr unsigned choice_interval = 8;
-constexpr unsigned fit_interval = 6;
+constexpr unsigned choice_interval = 16;
+constexpr unsigned fit_interval = 3;
 /// Values on which the choice is made, in runs of neighbours.
 constexpr std::size_t sample_values = 512;
 constexpr std::size_t sample_run = 16;
