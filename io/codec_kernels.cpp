@@ -264,40 +264,48 @@ VARVE_INLINE void look_back_body(const ImageOf<T>* newest, const T* const* diffe
   }
 }
 
-/// Bits of a magnitude, by way of a float's exponent: vectors have no instruction of their own for
-/// it. Of neighbouring ones only the highest stays, so that the conversion cannot round up to the
-/// next power of two.
-template <class U>
-VARVE_INLINE U length_of(U magnitude) {
-  const U half = magnitude >> 1;
-  const auto thinned = static_cast<std::make_signed_t<U>>(half & ~(half >> 1));
-  const auto exponent = std::bit_cast<std::uint32_t>(static_cast<float>(thinned)) >> 23;
-  return (magnitude != 0 ? 1u : 0u) + (exponent != 0 ? exponent - 126 : 0u);
-}
-
+/// Lengths are found by way of a float's exponent: vectors have no instruction of their own for it.
+/// Of neighbouring bits only the highest stays, so that the conversion cannot round up to the next
+/// power of two. Several short loops, each of one width, since mixed ones stay scalar.
 template <class T>
 VARVE_INLINE void tokenise_body(ImageOf<T>* residuals, const Expectation* expected, std::size_t n,
                                 Token* tokens) {
   using U = ImageOf<T>;
-  alignas(64) std::uint32_t code[block_values];  // length and sign
+  alignas(64) float half[block_values];          // about half the magnitude
+  alignas(64) std::uint32_t code[block_values];  // sign and lowest bit, then length and sign
   for (std::size_t i = 0; i < n; ++i) {
     const U sign = residuals[i] >> (sizeof(U) * 8 - 1);
     const U magnitude = (residuals[i] ^ (U{0} - sign)) + sign;
-    const U length = length_of<U>(magnitude);
-    const U nonzero = magnitude != 0 ? 1 : 0;
-    code[i] = static_cast<std::uint32_t>(length * 2 + sign);
-    residuals[i] = magnitude ^ (nonzero << (length - nonzero));
+    const U halved = magnitude >> 1;
+    half[i] = static_cast<float>(static_cast<std::make_signed_t<U>>(halved & ~(halved >> 1)));
+    code[i] = static_cast<std::uint32_t>((magnitude & 1) | sign << 1);
+    residuals[i] = magnitude;
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    const std::uint32_t exponent = std::bit_cast<std::uint32_t>(half[i]) >> 23;
+    const std::uint32_t length = exponent != 0 ? exponent - 125 : code[i] & 1;
+    code[i] = length * 2 + (code[i] >> 1);
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    const U length = code[i] >> 1;
+    const U highest = (U{1} << (length & (sizeof(U) * 8 - 1))) >> 1;
+    residuals[i] &= length == sizeof(U) * 8 ? ~(U{1} << (sizeof(U) * 8 - 1)) : ~highest;
   }
   for (std::size_t i = 0; i < n; ++i) {
     const std::uint32_t length = code[i] >> 1;
     const std::uint32_t sign = code[i] & 1;
     const std::uint32_t nonzero = length != 0 ? 1 : 0;
-    const std::uint32_t disagree = sign ^ (expected[i].context >> 7);
-    const std::uint32_t symbol = (length - expected[i].offset) * 2 + disagree;
-    const bool fits = length > expected[i].offset && symbol < tans_symbols;
-    const std::uint32_t written = fits ? symbol : tans_escape;
-    tokens[i].symbol = static_cast<std::uint8_t>(nonzero != 0 ? written : 0);
-    tokens[i].shape = static_cast<std::uint8_t>((length - nonzero) | nonzero << 6 | sign << 7);
+    const std::uint32_t offset = expected[i].offset;
+    const std::uint32_t disagree = sign ^ (static_cast<std::uint32_t>(expected[i].context) >> 7);
+    const std::uint32_t symbol = (length - offset) * 2 + disagree;
+    const std::uint32_t long_enough = length > offset ? 1 : 0;
+    const std::uint32_t fits = symbol < tans_symbols ? long_enough : 0;
+    const std::uint32_t written = fits != 0 ? symbol : tans_escape;
+    code[i] = (nonzero != 0 ? written : 0) | (length - nonzero) << 8 | nonzero << 14 | sign << 15;
+  }
+  for (std::size_t i = 0; i < n; ++i) {
+    tokens[i].symbol = static_cast<std::uint8_t>(code[i]);
+    tokens[i].shape = static_cast<std::uint8_t>(code[i] >> 8);
   }
 }
 
