@@ -231,11 +231,12 @@ std::vector<WidthCase> width_cases() {
 TEST(EngineWidth, KeepsTheBalanceOfMassTheMeanPressureAndAllGrains) {
   for (const WidthCase& each : width_cases()) {
     SCOPED_TRACE(each.name);
-    const auto simulation = started(each.scenario), control = started(each.scenario);
-    for (int n = 0; n < each.steps_before; ++n) {
-      simulation->advance();
-      control->advance();
-    }
+    const bool alone = each.scenario.grains.rows == 1;
+    const auto simulation = started(each.scenario);
+    for (int n = 0; n < each.steps_before; ++n) simulation->advance();
+    const auto control =
+        alone ? nullptr
+              : Simulation::restore(simulation->scenario(), Snapshot(*simulation).spans(), {});
     const double mass = mass_of(*simulation), pressure = mean_excess(*simulation);
     const std::vector<double> grains = field(*simulation, "grains.position");
     const auto ids = field<std::uint64_t>(*simulation, "fluid.id");
@@ -275,7 +276,7 @@ TEST(EngineWidth, KeepsTheBalanceOfMassTheMeanPressureAndAllGrains) {
     double peak_pressure = 0, peak_speed = 0;
     while (simulation->clock().time < until) {
       simulation->advance();
-      control->advance();
+      if (control) control->advance();
       for (const double p : simulation->fluid_report().pressure)
         peak_pressure = std::max(peak_pressure, std::abs(p));
       const std::vector<double> v = field(*simulation, "fluid.velocity");
@@ -283,12 +284,11 @@ TEST(EngineWidth, KeepsTheBalanceOfMassTheMeanPressureAndAllGrains) {
         peak_speed = std::max(peak_speed, std::hypot(v[a], v[a + 1]));
     }
     const double drift = (mean_excess(*simulation) - pressure) / unit;
-    const double due = (mean_excess(*simulation) - mean_excess(*control)) / unit;
+    const double due = control ? (mean_excess(*simulation) - mean_excess(*control)) / unit : drift;
     std::printf("%-32s mean excess pressure %+.2e rho0 c0^2, %+.2e by the change; peak pressure "
                 "%.3g Pa, peak speed %.3g m/s\n",
                 each.name.c_str(), drift, due, peak_pressure, peak_speed);
-    const bool alone = each.scenario.grains.rows == 1;
-    EXPECT_LT(std::abs(alone ? drift : due), alone ? 0.002 : 0.004);
+    EXPECT_LT(std::abs(due), alone ? 0.002 : 0.004);
   }
 }
 
