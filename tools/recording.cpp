@@ -248,6 +248,12 @@ RecordingResult record(io::Engine& engine, io::LogWriter& writer, const Target& 
 
 namespace {
 
+/// Annotations are remarks, made by tools and people too: nothing that has to come again.
+std::vector<io::Event> without_remarks(std::vector<io::Event> events) {
+  std::erase_if(events, [](const io::Event& event) { return event.kind == "annotation"; });
+  return events;
+}
+
 /// Compares the engine's last step with its record.
 std::optional<Mismatch> compare_step(const io::LogReader& log, const io::Engine& engine,
                                      const io::StepHeader& header, const io::Frame* recorded,
@@ -268,11 +274,12 @@ std::optional<Mismatch> compare_step(const io::LogReader& log, const io::Engine&
       if (const auto found = first_table_difference(engine.schema(), tables->view(), computed))
         return complete(*found);
   }
-  if (recorded_events != engine.events()) {
+  const std::vector<io::Event> computed_events = without_remarks(engine.events());
+  if (recorded_events != computed_events) {
     Mismatch found;
     found.field = "events";
     for (const io::Event& event : recorded_events) found.recorded += event_text(event) + "; ";
-    for (const io::Event& event : engine.events()) found.computed += event_text(event) + "; ";
+    for (const io::Event& event : computed_events) found.computed += event_text(event) + "; ";
     for (std::string* text : {&found.recorded, &found.computed})
       *text = text->empty() ? "none" : text->substr(0, text->size() - 2);
     return complete(found);
@@ -280,12 +287,12 @@ std::optional<Mismatch> compare_step(const io::LogReader& log, const io::Engine&
   return std::nullopt;
 }
 
-/// Events of one step that an engine would produce again; notes made by tools are not among them.
+/// Events of one step that an engine would produce again.
 std::vector<io::Event> events_of(const std::vector<io::Event>& all, std::uint64_t step) {
   std::vector<io::Event> chosen;
   for (const io::Event& event : all)
-    if (event.step == step && event.kind != "annotation") chosen.push_back(event);
-  return chosen;
+    if (event.step == step) chosen.push_back(event);
+  return without_remarks(chosen);
 }
 
 }  // namespace

@@ -95,8 +95,12 @@ TEST_F(RecordingTest, EveryStepIsRecordedWithItsDigestTablesAndEvents) {
     if (step == 100) break;
     rod.advance();
   }
-  ASSERT_EQ(log->events().size(), 2u);
-  EXPECT_EQ(log->events()[1], (io::Event{80, "cell_added", {{"id", "25"}}}));
+  const std::vector<io::Event> events = {{40, "cell_added", {{"id", "24"}}},
+                                         {50, "cell_removed", {{"id", "0"}}},
+                                         {64, "annotation", {{"text", "24 cells"}}},
+                                         {80, "cell_added", {{"id", "25"}}},
+                                         {100, "cell_removed", {{"id", "1"}}}};
+  EXPECT_EQ(log->events(), events);
 }
 
 TEST_F(RecordingTest, EveryStepIsReachedInEveryTier) {

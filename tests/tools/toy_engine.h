@@ -8,11 +8,13 @@
 
 #include "io/engine.h"
 #include "io/errors.h"
+#include "io/genesis.h"
 
 namespace varve::testing {
 
-/// Explicit heat conduction along a rod of cells. A cell is added at the end every 40 steps (the
-/// count varies), and cells hotter than 1 at a step's end are listed in a table.
+/// Explicit heat conduction along a rod of cells. A cell is added at the cold end every 40 steps and
+/// one removed at the hot end every 50 (the count varies, and an id is no index), every 64 there is
+/// a remark, and cells hotter than 1 at a step's end are listed in a table.
 class HeatRod : public io::Engine {
  public:
   explicit HeatRod(double conductivity = 0.2, std::size_t cells = 24)
@@ -60,6 +62,13 @@ class HeatRod : public io::Engine {
       temperature_.push_back(0);
       events_.push_back({step_, "cell_added", {{"id", std::to_string(id_.back())}}});
     }
+    if (step_ % 50 == 0) {
+      events_.push_back({step_, "cell_removed", {{"id", std::to_string(id_.front())}}});
+      id_.erase(id_.begin());
+      temperature_.erase(temperature_.begin());
+    }
+    if (step_ % 64 == 0)
+      events_.push_back({step_, "annotation", {{"text", std::to_string(id_.size()) + " cells"}}});
     list_hot_cells();
   }
 
