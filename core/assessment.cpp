@@ -14,8 +14,13 @@ std::string setting(std::string_view key, const Scenario& s) {
   return std::string(key) + " = " + get_parameter(s, *find_parameter(key));
 }
 
+bool is_pipe(const Scenario& s) {
+  return s.domain.dimension == 3 && s.domain.shape == Shape::pipe;
+}
+
 bool any_side(const Scenario& s, Boundary kind) {
-  return s.domain.sides == kind || s.domain.bottom == kind || s.domain.top == kind;
+  const bool face = s.domain.dimension == 3 && !is_pipe(s) && s.domain.faces == kind;
+  return s.domain.sides == kind || s.domain.bottom == kind || s.domain.top == kind || face;
 }
 
 bool grains_move(const Scenario& s) {
@@ -45,10 +50,14 @@ class Assessor {
 
   void count() {
     const Lattice lattice = fluid_lattice(s_);
-    a_.fluid_particles = static_cast<std::uint64_t>(lattice.columns * lattice.rows);
-    if (s_.has_fluid()) a_.fluid_mass = s_.fluid.density * s_.domain.width * s_.fluid.level;
+    a_.fluid_particles = static_cast<std::uint64_t>(lattice.particles);
+    const double dx = s_.fluid.spacing;
+    const double volume = s_.domain.dimension == 2 ? dx * dx : dx * dx * dx;
+    if (s_.has_fluid())
+      a_.fluid_mass = s_.fluid.density * volume * static_cast<double>(lattice.particles);
     if (!s_.has_grains()) return;
-    a_.grains = static_cast<std::uint64_t>(s_.grains.rows * s_.grains.columns);
+    a_.grains = static_cast<std::uint64_t>(s_.grains.rows * s_.grains.columns *
+                                           s_.grains.layers);
     a_.grain_mass = static_cast<double>(a_.grains) * grain_mass(s_);
     // The grains' volume is taken out of the fluid only where it feels them.
     if (s_.is_coupled() && s_.coupling.mode == CouplingMode::two_way)
@@ -141,9 +150,11 @@ class Assessor {
            "full: under hydrostatic pressure the particles lock into a lattice, and slow settling "
            "comes out up to 45 % too slow; use excess where the domain is closed and full");
     const Lattice lattice = fluid_lattice(s_);
-    if (std::min(lattice.columns, lattice.rows) < 10)
+    std::int64_t fewest = std::min(lattice.columns, lattice.rows);
+    if (s_.domain.dimension == 3) fewest = std::min(fewest, lattice.layers);
+    if (fewest < 10)
       warn("fluid.spacing",
-           "only " + std::to_string(std::min(lattice.columns, lattice.rows)) +
+           "only " + std::to_string(fewest) +
                " particles across the domain; flow between walls needs 10 or more");
     if (s_.time.cfl > 0.5)
       warn("time.cfl", number_text(s_.time.cfl) +
@@ -178,6 +189,11 @@ class Assessor {
       warn("domain.width",
            number_text(s_.domain.width) +
                " m is narrower than two coupling radii: walls cut every grain's view");
+    if (s_.domain.dimension == 3 && s_.domain.shape == Shape::box &&
+        s_.domain.depth < 2 * coupling_radius(s_))
+      warn("domain.depth",
+           number_text(s_.domain.depth) +
+               " m is less than two coupling radii: walls cut every grain's view");
     warn_about_drag();
   }
 
@@ -222,13 +238,21 @@ std::vector<ModelUse> models_of(const Scenario& s) {
       !fluid                            ? "no fluid"
       : s.domain.top == Boundary::free  ? setting("domain.top", s)
       : s.fluid.level < s.domain.height ? "fluid.level is below the top"
+      : !std::isnan(s.fluid.width)      ? setting("fluid.width", s)
                                         : "the domain is full");
   const bool walls = any_side(s, Boundary::no_slip) || any_side(s, Boundary::free_slip);
   add("walls", walls, walls ? "sides, bottom or top are walls" : "every side is periodic");
   const bool periodic = any_side(s, Boundary::periodic);
   add("periodic sides", periodic, periodic ? "sides or bottom and top" : "no side is periodic");
-  const bool body = fluid && (s.fluid.body_force_x != 0 || s.fluid.body_force_y != 0);
-  add("body force", body, body ? "fluid.body_force_x, fluid.body_force_y" : "zero");
+  add("pipe", is_pipe(s), setting("domain.shape", s));
+  const bool lid = s.domain.lid_speed != 0 || s.domain.floor_speed != 0;
+  add("moving walls", lid,
+      setting("domain.lid_speed", s) + ", " + setting("domain.floor_speed", s));
+  add("flow at the start", fluid && s.fluid.initial != InitialFlow::rest,
+      fluid ? setting("fluid.initial", s) : "no fluid");
+  const bool body = fluid && (s.fluid.body_force_x != 0 || s.fluid.body_force_y != 0 ||
+                              s.fluid.body_force_z != 0);
+  add("body force", body, body ? "fluid.body_force_x, _y, _z" : "zero");
   const std::string array = setting("grains.rows", s) + ", " + setting("grains.columns", s);
   add("grains", grains, array);
   const bool moving = grains_move(s);

@@ -46,6 +46,9 @@ Constants<D> constants_of(const Scenario& s) {
     c.period.length[0] = s.domain.width;
   }
   if (s.domain.bottom == Boundary::periodic) c.period.length[1] = s.domain.height;
+  if constexpr (D == 3)
+    if (s.domain.shape == Shape::box && s.domain.faces == Boundary::periodic)
+      c.period.length[2] = s.domain.depth;
   if (s.has_fluid()) {
     c.spacing = s.fluid.spacing;
     c.smoothing_length = s.fluid.smoothing_ratio * s.fluid.spacing;
@@ -57,6 +60,7 @@ Constants<D> constants_of(const Scenario& s) {
     if (c.full_pressure) c.fluid_acceleration = c.gravity;
     c.fluid_acceleration[0] += s.fluid.body_force_x;
     c.fluid_acceleration[1] += s.fluid.body_force_y;
+    if constexpr (D == 3) c.fluid_acceleration[2] += s.fluid.body_force_z;
   }
   if (s.has_grains()) set_grains(s, c);
   if (c.coupled) {
@@ -69,5 +73,6 @@ Constants<D> constants_of(const Scenario& s) {
 }
 
 template Constants<2> constants_of<2>(const Scenario&);
+template Constants<3> constants_of<3>(const Scenario&);
 
 }  // namespace varve::core

@@ -25,9 +25,16 @@ double dot(const Vec<double, D>& a, const Vec<double, D>& b) {
 Vec<double, 2> spin_velocity(const Vec<double, 1>& spin, const Vec<double, 2>& arm) {
   return {-spin[0] * arm[1], spin[0] * arm[0]};
 }
+Vec<double, 3> spin_velocity(const Vec<double, 3>& spin, const Vec<double, 3>& arm) {
+  return {spin[1] * arm[2] - spin[2] * arm[1], spin[2] * arm[0] - spin[0] * arm[2],
+          spin[0] * arm[1] - spin[1] * arm[0]};
+}
 /// Torque of a force at arm r: r x f.
 Vec<double, 1> torque(const Vec<double, 2>& arm, const Vec<double, 2>& force) {
   return Vec<double, 1>(arm[0] * force[1] - arm[1] * force[0]);
+}
+Vec<double, 3> torque(const Vec<double, 3>& arm, const Vec<double, 3>& force) {
+  return spin_velocity(arm, force);
 }
 
 template <int D, class Position>
@@ -57,7 +64,7 @@ bool Contacts<D, P>::list_is_stale(const Constants<D>& c, const GrainState<D, P>
 }
 
 template <int D, class P>
-void Contacts<D, P>::build_list(const Constants<D>& c, const std::vector<WallPlane>& walls,
+void Contacts<D, P>::build_list(const Constants<D>& c, const std::vector<Wall>& walls,
                                 const GrainState<D, P>& grains) {
   Workers alone(1);
   const double reach = (1 + list_skin_per_diameter) * c.diameter;
@@ -152,14 +159,14 @@ void Contacts<D, P>::store(const Constants<D>& c, ContactState<D, P>& contacts) 
 
 template <int D, class P>
 typename Contacts<D, P>::Geometry Contacts<D, P>::geometry(
-    const Constants<D>& c, const std::vector<WallPlane>& walls, const GrainState<D, P>& grains,
+    const Constants<D>& c, const std::vector<Wall>& walls, const GrainState<D, P>& grains,
     const Slot& slot) const {
   Geometry g;
   if (slot.is_wall) {
-    const WallPlane& wall = walls[slot.j];
-    g.normal = wall.inward * Vec<double, D>::Unit(wall.axis);
-    g.overlap = c.radius - distance_inside<D>(
-                               wall, grains.position[slot.i].template cast<double>());
+    const Wall& wall = walls[slot.j];
+    const Vec<double, D> x = grains.position[slot.i].template cast<double>();
+    g.normal = inward_normal<D>(wall, x);
+    g.overlap = c.radius - distance_inside<D>(wall, x);
     return g;
   }
   const Vec<double, D> d = difference(c, grains.position[slot.i], grains.position[slot.j]);
@@ -173,14 +180,17 @@ typename Contacts<D, P>::Geometry Contacts<D, P>::geometry(
 /// E10. n points to grain i. F_n = max(0, k delta - eta v_n), eta = alpha sqrt(m_eff k); the
 /// dashpot never pulls. F_t = -k_t xi - eta v_t, cut at mu F_n with the spring shortened to match.
 template <int D, class P>
-void Contacts<D, P>::evaluate(const Constants<D>& c, const std::vector<WallPlane>& walls,
+void Contacts<D, P>::evaluate(const Constants<D>& c, const std::vector<Wall>& walls,
                               const GrainState<D, P>& grains, double dt, Slot& slot) const {
   const Geometry g = geometry(c, walls, grains, slot);
   slot.force.setZero();
   slot.torque_i.setZero();
   slot.torque_j.setZero();
   Vec<double, D> relative = grains.velocity[slot.i].template cast<double>();
-  if (!slot.is_wall) relative -= grains.velocity[slot.j].template cast<double>();
+  if (slot.is_wall)
+    relative[0] -= walls[slot.j].speed_x;
+  else
+    relative -= grains.velocity[slot.j].template cast<double>();
   if (!(g.overlap > 0)) {
     if (slot.touching) {
       slot.record.end = true;
@@ -296,7 +306,7 @@ void Contacts<D, P>::move(const Constants<D>& c, std::span<const OuterForce<D>> 
 
 template <int D, class P>
 void Contacts<D, P>::advance(const Constants<D>& c, std::span<const OuterForce<D>> outer,
-                             const std::vector<WallPlane>& walls, double overlap_limit,
+                             const std::vector<Wall>& walls, double overlap_limit,
                              std::uint64_t step, GrainState<D, P>& grains,
                              ContactState<D, P>& contacts) {
   if (list_is_stale(c, grains)) {
@@ -330,5 +340,8 @@ Vec<double, D> Contacts<D, P>::wall_impulse() const {
 template class Contacts<2, DoublePrecision>;
 template class Contacts<2, FloatPrecision>;
 template class Contacts<2, MixedPrecision>;
+template class Contacts<3, DoublePrecision>;
+template class Contacts<3, FloatPrecision>;
+template class Contacts<3, MixedPrecision>;
 
 }  // namespace varve::core

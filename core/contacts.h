@@ -56,7 +56,7 @@ class Contacts {
   /// so that it is stable for any K, exact at terminal speed and zero on a grain that rests on a
   /// contact. Throws NumericalFailure where an overlap exceeds `overlap_limit` [m].
   void advance(const Constants<D>& c, std::span<const OuterForce<D>> outer,
-               const std::vector<WallPlane>& walls, double overlap_limit, std::uint64_t step,
+               const std::vector<Wall>& walls, double overlap_limit, std::uint64_t step,
                GrainState<D, P>& grains, ContactState<D, P>& contacts);
 
   /// Mean drag on each grain over the last step [N]: what the fluid must lose.
@@ -83,14 +83,14 @@ class Contacts {
     double overlap = 0;
   };
   bool list_is_stale(const Constants<D>& c, const GrainState<D, P>& grains) const;
-  void build_list(const Constants<D>& c, const std::vector<WallPlane>& walls,
+  void build_list(const Constants<D>& c, const std::vector<Wall>& walls,
                   const GrainState<D, P>& grains);
   void take_over(const std::vector<Slot>& old);
   void load(const ContactState<D, P>& contacts);
   void store(const Constants<D>& c, ContactState<D, P>& contacts) const;
-  Geometry geometry(const Constants<D>& c, const std::vector<WallPlane>& walls,
+  Geometry geometry(const Constants<D>& c, const std::vector<Wall>& walls,
                     const GrainState<D, P>& grains, const Slot& slot) const;
-  void evaluate(const Constants<D>& c, const std::vector<WallPlane>& walls,
+  void evaluate(const Constants<D>& c, const std::vector<Wall>& walls,
                 const GrainState<D, P>& grains, double dt, Slot& slot) const;
   void check_overlap(const Slot& slot, double overlap, double limit, std::uint64_t step) const;
   void move(const Constants<D>& c, std::span<const OuterForce<D>> outer, double dt,

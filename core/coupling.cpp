@@ -39,7 +39,7 @@ bool CouplingStage<D, P>::stale(const Constants<D>& c, const State<D, P>& state,
 
 template <int D, class P>
 void CouplingStage<D, P>::rebuild(const Constants<D>& c, const State<D, P>& state,
-                             std::span<const WallPlane> walls, double skin,
+                             std::span<const Wall> walls, double skin,
                              Workers& workers) {
   const double radius = 2 * c.coupling_length + skin;
   const std::span<const Vec<Position, D>> grains(state.grains.position);
@@ -78,9 +78,14 @@ typename CouplingStage<D, P>::Images CouplingStage<D, P>::images(const Constants
     places[k][0] = x[k];
     counts[k] = 1;
   }
-  for (const WallPlane& wall : walls_)
-    if (distance_inside<D>(wall, x) < 2 * c.coupling_length)
+  const Wall* pipe = nullptr;
+  for (const Wall& wall : walls_) {
+    if (!(distance_inside<D>(wall, x) < 2 * c.coupling_length)) continue;
+    if (wall.is_pipe())
+      pipe = &wall;
+    else
       places[wall.axis][counts[wall.axis]++] = 2 * wall.at - x[wall.axis];
+  }
   Images result;
   int total = 1;
   for (int k = 0; k < D; ++k) total *= counts[k];
@@ -92,6 +97,15 @@ typename CouplingStage<D, P>::Images CouplingStage<D, P>::images(const Constants
       rest /= counts[k];
     }
   }
+  if (!pipe) return result;
+  // As in a plane that touches the curved wall where it is nearest, the images found so far too.
+  const Vec<double, D> across =
+      -2 * distance_inside<D>(*pipe, x) * inward_normal<D>(*pipe, x);
+  const int flat = result.count;
+  result.at[static_cast<std::size_t>(result.count++)] = x + across;
+  for (int n = 0; n < flat; ++n)
+    result.at[static_cast<std::size_t>(result.count++)] =
+        result.at[static_cast<std::size_t>(n)] + across;
   return result;
 }
 
@@ -224,5 +238,8 @@ void CouplingStage<D, P>::set_drag(std::span<const Vec<double, D>> mean_drag) {
 template class CouplingStage<2, DoublePrecision>;
 template class CouplingStage<2, FloatPrecision>;
 template class CouplingStage<2, MixedPrecision>;
+template class CouplingStage<3, DoublePrecision>;
+template class CouplingStage<3, FloatPrecision>;
+template class CouplingStage<3, MixedPrecision>;
 
 }  // namespace varve::core

@@ -47,7 +47,7 @@ class CouplingStage {
   bool stale(const Constants<D>& c, const State<D, P>& state, double skin) const;
   /// Candidates within `skin` beyond the support, by positions as they are now; `walls` mirror
   /// grains until the next call.
-  void rebuild(const Constants<D>& c, const State<D, P>& state, std::span<const WallPlane> walls,
+  void rebuild(const Constants<D>& c, const State<D, P>& state, std::span<const Wall> walls,
                double skin, Workers& workers);
 
   /// E3: eps_a = 1 - sum_j V_j w_aj, written floored to `floored` and as it is to `porosity`. w_aj
@@ -85,7 +85,8 @@ class CouplingStage {
   struct Near {
     std::uint32_t grain, slot;
   };
-  /// Images of a point in walls nearer than 2 hc, in a corner also those in two or three at once.
+  /// Images of a point in walls nearer than 2 hc, in a corner also those in two or three at once;
+  /// a curved wall is taken as the plane that touches it where it is nearest.
   struct Images {
     std::array<Vec<double, D>, 26> at;
     int count = 0;
@@ -98,7 +99,7 @@ class CouplingStage {
                          const FluidView<D, P>& fluid, const DragLaw<D>& law, std::size_t i) const;
 
   Rows fluid_of_, grains_of_;  // per grain
-  std::vector<WallPlane> walls_;
+  std::vector<Wall> walls_;
   std::vector<Vec<Position, D>> listed_at_;  // grains
   std::size_t listed_fluid_ = 0;
   std::vector<double> weights_;           // per slot of fluid_of_

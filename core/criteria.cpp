@@ -5,9 +5,11 @@
 #include <limits>
 
 #include "core/drag.h"
+#include "core/initial_flow.h"
 #include "core/kernel.h"
 #include "core/math.h"
 #include "core/parameters.h"
+#include "core/walls.h"
 
 namespace varve::core {
 namespace {
@@ -34,23 +36,34 @@ double balance_speed(const Scenario& scenario, double weight) {
   return high;
 }
 
-double length_of(double x, double y) { return std::sqrt(x * x + y * y); }
+double length_of(double x, double y, double z) { return std::sqrt(x * x + y * y + z * z); }
+
+double body_force(const Scenario& s) {
+  return length_of(s.fluid.body_force_x, s.fluid.body_force_y, s.fluid.body_force_z);
+}
 
 bool grains_move(const Scenario& scenario) {
   return scenario.has_grains() && scenario.grains.motion == GrainMotion::free;
 }
 
 /// What a body force does to the fluid: where it drives it round through periodic sides, the speed
-/// in the middle of a plane channel with the walls beside it; else a free fall along the domain.
+/// in the middle of a plane channel (or pipe) with the walls beside it; else a free fall along the
+/// domain.
 double body_force_speed(const Scenario& s) {
-  const double force = length_of(s.fluid.body_force_x, s.fluid.body_force_y);
-  const bool along_x = std::abs(s.fluid.body_force_x) >= std::abs(s.fluid.body_force_y);
-  const Boundary ends = along_x ? s.domain.sides : s.domain.bottom;
-  const Boundary beside = along_x ? s.domain.bottom : s.domain.sides;
-  const double gap = along_x ? s.domain.height : s.domain.width;
-  if (ends == Boundary::periodic && beside != Boundary::periodic)
-    return force * gap * gap * s.fluid.density / (8 * s.fluid.viscosity);
-  return std::sqrt(2 * force * (along_x ? s.domain.width : s.domain.height));
+  const Domain& d = s.domain;
+  const bool solid = d.dimension == 3, pipe = solid && d.shape == Shape::pipe;
+  const double force = body_force(s);
+  const double parts[] = {std::abs(s.fluid.body_force_x), std::abs(s.fluid.body_force_y),
+                          std::abs(s.fluid.body_force_z)};
+  const Boundary ends[] = {d.sides, d.bottom, solid ? d.faces : Boundary::periodic};
+  const double extents[] = {d.width, d.height, solid ? d.depth : 0};
+  const std::ptrdiff_t along = std::max_element(parts, parts + 3) - parts;
+  double gap = std::numeric_limits<double>::infinity();
+  for (std::ptrdiff_t k = 0; k < 3; ++k)
+    if (k != along && ends[k] != Boundary::periodic) gap = std::min(gap, extents[k]);
+  if (ends[along] == Boundary::periodic && std::isfinite(gap))
+    return force * gap * gap * s.fluid.density / ((pipe ? 16 : 8) * s.fluid.viscosity);
+  return std::sqrt(2 * force * extents[along]);
 }
 
 }  // namespace
@@ -80,7 +93,7 @@ double grain_volume(const Scenario& s) {
 double grain_mass(const Scenario& s) { return s.grains.density * grain_volume(s); }
 
 double least_effective_mass(const Scenario& s) {
-  const bool one = s.grains.rows == 1 && s.grains.columns == 1;
+  const bool one = s.grains.rows == 1 && s.grains.columns == 1 && s.grains.layers == 1;
   return one ? grain_mass(s) : 0.5 * grain_mass(s);
 }
 
@@ -98,7 +111,8 @@ std::int64_t substeps(const Scenario& s) {
 
 bool has_free_surface(const Scenario& s) {
   if (!s.has_fluid()) return false;
-  return s.domain.top == Boundary::free || s.fluid.level < s.domain.height;
+  return s.domain.top == Boundary::free || s.fluid.level < s.domain.height ||
+         !std::isnan(s.fluid.width);
 }
 
 double terminal_speed(const Scenario& s) {
@@ -125,20 +139,26 @@ SpeedEstimate expected_speeds(const Scenario& s) {
       estimate.fluid = driven;
       estimate.fluid_reason = "body force over the domain";
     }
+    const auto at_least = [&](double speed, const char* reason) {
+      if (speed <= estimate.fluid) return;
+      estimate.fluid = speed;
+      estimate.fluid_reason = reason;
+    };
+    at_least(std::abs(s.domain.lid_speed), "domain.lid_speed");
+    at_least(std::abs(s.domain.floor_speed), "domain.floor_speed");
+    at_least(largest_initial_speed(s), "flow at the start");
     if (s.fluid.pressure == PressureForm::full && s.gravity.magnitude > 0) {
       const double level = std::isnan(s.fluid.level) ? s.domain.height : s.fluid.level;
       const double fall = std::sqrt(2 * s.gravity.magnitude * level);
-      if (fall > estimate.fluid) {
-        estimate.fluid = fall;
-        estimate.fluid_reason = "full pressure: sqrt(2 g H)";
-      }
+      at_least(fall, "full pressure: sqrt(2 g H)");
     }
   }
   estimate.grains_reason = "no grains";
   if (s.has_grains() && s.grains.motion == GrainMotion::frozen) {
     estimate.grains_reason = "grains are frozen";
   } else if (s.has_grains()) {
-    const double first = length_of(s.grains.velocity_x, s.grains.velocity_y);
+    const double first =
+        length_of(s.grains.velocity_x, s.grains.velocity_y, s.grains.velocity_z);
     const double settling = s.is_coupled() ? terminal_speed(s) : 0;
     estimate.grains = std::max(first, settling);
     estimate.grains_reason =
@@ -151,7 +171,7 @@ SpeedEstimate expected_speeds(const Scenario& s) {
 double outer_acceleration(const Scenario& s) {
   double largest = 0;
   if (s.has_fluid()) {
-    largest = length_of(s.fluid.body_force_x, s.fluid.body_force_y);
+    largest = body_force(s);
     if (s.fluid.pressure != PressureForm::excess) largest += s.gravity.magnitude;
   }
   if (grains_move(s)) {
@@ -238,7 +258,18 @@ Lattice fluid_lattice(const Scenario& s) {
   const auto along = [&](double extent) {
     return nearest_integer(std::min(extent / s.fluid.spacing, 1e15));
   };
-  return {along(s.domain.width), along(level)};
+  Lattice lattice{along(std::isnan(s.fluid.width) ? s.domain.width : s.fluid.width),
+                  along(level)};
+  if (s.domain.dimension == 3) lattice.layers = along(s.domain.depth);
+  std::int64_t sites = lattice.columns * lattice.layers;
+  if (s.domain.dimension == 3 && s.domain.shape == Shape::pipe) {
+    sites = 0;
+    for (std::int64_t k = 0; k < lattice.layers; ++k)
+      for (std::int64_t i = 0; i < lattice.columns; ++i)
+        sites += in_pipe(i, k, lattice.columns) ? 1 : 0;
+  }
+  lattice.particles = sites * lattice.rows;
+  return lattice;
 }
 
 double grain_pitch(const Scenario& s) { return s.grains.diameter * (1 + s.grains.gap); }

@@ -41,7 +41,7 @@ std::int64_t substeps(const Scenario& scenario);
 inline constexpr double substeps_per_contact = 30;
 inline constexpr double substeps_per_contact_min = 10;
 
-/// A free surface: an open top, or a box that is not full.
+/// A free surface: an open top, or a box that is not full at the start.
 bool has_free_surface(const Scenario& scenario);
 
 /// [m/s] speed at which drag holds the submerged weight of one grain in fluid at rest; 0 where the
@@ -87,9 +87,11 @@ std::uint64_t first_step_at(double seconds, double dt);
 /// The last step whose time is <= seconds + 1e-6 dt, counted from time 0 with a fixed dt.
 std::uint64_t last_step_at(double seconds, double dt);
 
-/// Lattice of the fluid at the start: particles along x and y. {0, 0} without fluid.
+/// Lattice of the fluid at the start: sites along x, y and z (1 in 2D), and how many of them hold a
+/// particle (all, but for a pipe). Zero without fluid.
 struct Lattice {
-  std::int64_t columns = 0, rows = 0;
+  std::int64_t columns = 0, rows = 0, layers = 1;
+  std::int64_t particles = 0;
 };
 Lattice fluid_lattice(const Scenario& scenario);
 

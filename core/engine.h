@@ -115,7 +115,7 @@ class Engine final : public Simulation {
   CouplingStage<D, P> coupling_;
   Contacts<D, P> contacts_;
   DragLaw<D> drag_law_;
-  std::vector<WallPlane> planes_;
+  std::vector<Wall> walls_;
   RunOptions options_;
 
   StageDigests stage_digests_;

@@ -28,7 +28,7 @@ Engine<D, P>::Engine(const Scenario& scenario, State<D, P> state, const RunOptio
 template <int D, class P>
 void Engine<D, P>::adopt_scenario() {
   c_ = constants_of<D>(scenario_);
-  planes_ = wall_planes(scenario_);
+  walls_ = domain_walls(scenario_);
   if (scenario_.has_fluid()) {
     build_walls();
     sweeps_ = pair_sweeps<D, P>(scenario_.fluid.kernel, c_.period.any(), instruction_set_);
@@ -48,7 +48,8 @@ void Engine<D, P>::adopt_scenario() {
 
 template <int D, class P>
 void Engine<D, P>::build_walls() {
-  const std::vector<WallDummy<D>> dummies = wall_dummies(scenario_, fluid_dummy_layers(scenario_));
+  const std::vector<WallDummy<D>> dummies =
+      wall_dummies<D>(scenario_, fluid_dummy_layers(scenario_));
   const std::size_t n = dummies.size();
   const Real volume = static_cast<Real>(integer_power<D>(c_.spacing));
   work_.wall_count = n;
@@ -62,6 +63,7 @@ void Engine<D, P>::build_walls() {
   work_.wall_pressure.assign(n + 1, 0);
   for (std::size_t w = 0; w < n; ++w) {
     work_.wall_position[w] = dummies[w].position.template cast<Position>();
+    work_.wall_own_velocity[w][0] = static_cast<Real>(dummies[w].speed_x);
     work_.wall_volume[w] = volume;
     work_.wall_viscous_volume[w] = dummies[w].kind == Boundary::no_slip ? volume : Real(0);
   }

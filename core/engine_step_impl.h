@@ -78,7 +78,7 @@ void Engine<D, P>::update_lists() {
                  std::span(work_.wall_position.data(), work_.wall_count), c_.support, skin,
                  c_.period, workers_);
   if (c_.coupled)
-    coupling_.rebuild(c_, state_, planes_, skin, workers_);
+    coupling_.rebuild(c_, state_, walls_, skin, workers_);
   ++counters_.list_rebuilds;
   count_pass(engine_detail::pass_lists);
 }
@@ -210,7 +210,7 @@ void Engine<D, P>::move_grains() {
     hold_grains();
     return;
   }
-  contacts_.advance(c_, work_.outer, planes_, scenario_.guards.overlap * c_.diameter,
+  contacts_.advance(c_, work_.outer, walls_, scenario_.guards.overlap * c_.diameter,
                     state_.clock.step + 1, next_.grains, next_.contacts);
   counters_.grain_substeps += static_cast<std::uint64_t>(c_.substeps);
   count_pass(engine_detail::pass_contacts);
@@ -332,8 +332,8 @@ double Engine<D, P>::density_deviation(std::size_t a) const {
 template <int D, class P>
 double Engine<D, P>::beyond_walls(const Vec<Position, D>& x) const {
   double beyond = -std::numeric_limits<double>::infinity();
-  for (const WallPlane& plane : planes_)
-    beyond = std::max(beyond, -plane.inward * (static_cast<double>(x[plane.axis]) - plane.at));
+  for (const Wall& wall : walls_)
+    beyond = std::max(beyond, -distance_inside<D>(wall, x.template cast<double>()));
   return beyond;
 }
 

@@ -47,5 +47,7 @@ void FluidLists<D, Position>::rebuild(std::span<const Vec<Position, D>> fluid,
 
 template class FluidLists<2, double>;
 template class FluidLists<2, float>;
+template class FluidLists<3, double>;
+template class FluidLists<3, float>;
 
 }  // namespace varve::core

@@ -71,6 +71,9 @@ std::vector<Problem> width_problems(const Scenario& before, const Scenario& afte
   if (change == 0) return {};
   if (before.domain.sides == Boundary::periodic)
     return {{"domain.width", "the sides are periodic; only walls can move"}};
+  if (before.domain.dimension == 3 && before.domain.shape == Shape::pipe)
+    return {{"domain.width", "the wall of a pipe is round and does not move by whole columns of "
+                             "the lattice; start a new run of another width"}};
   if (!before.has_fluid()) return {};
   const double dx = before.fluid.spacing;
   const double walls = anchor == 0 ? 2 : 1;
@@ -180,7 +183,11 @@ std::string_view fixed_reason(const Parameter& parameter) {
   if (key == "scenario.title") return "it names the family of runs";
   if (key == "domain.dimension") return "the dimension of the recorded state is fixed";
   if (key == "domain.left") return "the left side moves with domain.width";
-  if (key == "domain.height") return "only the side walls can move: change domain.width";
+  if (key == "domain.shape") return "the shape of the domain is fixed in a family of runs";
+  if (key == "domain.lid_speed" || key == "domain.floor_speed")
+    return "it is part of how the fluid is driven";
+  if (key == "domain.height" || key == "domain.depth")
+    return "only the side walls can move: change domain.width";
   if (section == "domain") return "the kind of boundary is fixed in a family of runs";
   if (key == "fluid.kernel" || key == "fluid.smoothing_ratio" || key == "fluid.spacing")
     return "kernel and resolution are fixed: the fluid's particles carry them";

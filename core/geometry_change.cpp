@@ -14,18 +14,20 @@
 namespace varve::core {
 namespace {
 
-using DoubleState = State<2, DoublePrecision>;
+template <int D>
+using DoubleState = State<D, DoublePrecision>;
 
 constexpr double tolerated_overlap = 0.01;  // of a diameter
 
 /// A change under way: the scene before and after, and how far each wall moves outward [m].
+template <int D>
 struct Move {
   const Scenario& before;
   Scenario after;
   double left_outward, right_outward;
 
-  Box<2> old_box() const { return domain_box(before); }
-  Box<2> new_box() const { return domain_box(after); }
+  Box<D> old_box() const { return domain_box<D>(before); }
+  Box<D> new_box() const { return domain_box<D>(after); }
   bool closed() const { return !has_free_surface(before); }
   bool full_pressure() const { return before.fluid.pressure == PressureForm::full; }
   bool moves(std::uint64_t wall) const {
@@ -58,6 +60,27 @@ std::string id_list(const std::vector<std::uint64_t>& ids) {
   return text;
 }
 
+/// Written out, since the order of a sum is part of the contract.
+template <int D>
+double squared(const Vec<double, D>& v) {
+  double sum = 0;
+  for (int k = 0; k < D; ++k) sum += v[k] * v[k];
+  return sum;
+}
+
+/// A point of D coordinates from three.
+template <int D>
+Vec<double, D> point(double x, double y, double z) {
+  if constexpr (D == 2) return {x, y};
+  if constexpr (D == 3) return {x, y, z};
+}
+
+/// Lines of the fluid's lattice along z: one in 2D.
+template <int D>
+std::int64_t lattice_layers(const Scenario& scenario) {
+  return D == 2 ? 1 : nearest_integer(scenario.domain.depth / scenario.fluid.spacing);
+}
+
 bool contains(const std::vector<std::uint64_t>& sorted, std::uint64_t id) {
   return std::binary_search(sorted.begin(), sorted.end(), id);
 }
@@ -65,7 +88,8 @@ bool contains(const std::vector<std::uint64_t>& sorted, std::uint64_t id) {
 // ---- grains ----
 
 /// Indices of grains that reach more than the tolerated overlap beyond a moved wall.
-std::vector<std::size_t> grains_outside(const Move& move, const DoubleState& state) {
+template <int D>
+std::vector<std::size_t> grains_outside(const Move<D>& move, const DoubleState<D>& state) {
   std::vector<std::size_t> outside;
   const double d = move.before.grains.diameter;
   for (std::size_t i = 0; i < state.grains.size(); ++i)
@@ -75,7 +99,8 @@ std::vector<std::size_t> grains_outside(const Move& move, const DoubleState& sta
 }
 
 /// "...; the narrowest width that holds all grains is W m", where there is one between new and old.
-std::string narrowest_advice(const Move& move, const DoubleState& state) {
+template <int D>
+std::string narrowest_advice(const Move<D>& move, const DoubleState<D>& state) {
   double reach = 0;  // [m] that the walls have to stay further out
   const double d = move.before.grains.diameter;
   for (const auto& x : state.grains.position)
@@ -88,16 +113,17 @@ std::string narrowest_advice(const Move& move, const DoubleState& state) {
   return "; the narrowest width that holds all grains is " + rough_number(width) + " m";
 }
 
-void check_pushed(const Move& move, const DoubleState& state,
+template <int D>
+void check_pushed(const Move<D>& move, const DoubleState<D>& state,
                   const std::vector<std::size_t>& pushed) {
   const double d = move.before.grains.diameter;
-  const Box<2> box = move.new_box();
+  const Box<D> box = move.new_box();
   for (const std::size_t i : pushed)
     for (std::size_t j = 0; j < state.grains.size(); ++j) {
       if (j == i) continue;
-      const Vec<double, 2> apart =
+      const Vec<double, D> apart =
           box.separation(state.grains.position[i], state.grains.position[j]);
-      const double overlap = d - std::sqrt(apart[0] * apart[0] + apart[1] * apart[1]);
+      const double overlap = d - std::sqrt(squared<D>(apart));
       if (overlap > tolerated_overlap * d)
         throw ModelError("domain.width: pushed inside the new wall, grain " +
                          std::to_string(state.grains.id[i]) + " would overlap grain " +
@@ -117,7 +143,8 @@ void erase_marked(std::vector<T>& values, const std::vector<bool>& marked) {
   values.resize(kept);
 }
 
-void settle_grains(const Move& move, OutsideMode mode, DoubleState& state,
+template <int D>
+void settle_grains(const Move<D>& move, OutsideMode mode, DoubleState<D>& state,
                    GeometryReport& report) {
   const std::vector<std::size_t> outside = grains_outside(move, state);
   if (outside.empty()) return;
@@ -147,7 +174,8 @@ void settle_grains(const Move& move, OutsideMode mode, DoubleState& state,
   report.grains_removed = std::move(ids);
 }
 
-void prune_contacts(const Move& move, DoubleState& state, GeometryReport& report) {
+template <int D>
+void prune_contacts(const Move<D>& move, DoubleState<D>& state, GeometryReport& report) {
   auto& contacts = state.contacts;
   std::vector<bool> marked(contacts.size(), false);
   const auto touched = [&](std::uint64_t id) {
@@ -165,14 +193,16 @@ void prune_contacts(const Move& move, DoubleState& state, GeometryReport& report
 
 // ---- fluid ----
 
-double total_mass(const DoubleState& state) {
+template <int D>
+double total_mass(const DoubleState<D>& state) {
   double sum = 0;
   for (const double m : state.fluid.mass) sum += m;
   return sum;
 }
 
 /// Fluid that stays keeps volume m / rhob and pressure, a function of rhob / eps: both follow eps.
-void follow_porosity(DoubleState& state, const std::vector<double>& eps_before,
+template <int D>
+void follow_porosity(DoubleState<D>& state, const std::vector<double>& eps_before,
                      const std::vector<double>& eps_after) {
   for (std::size_t a = 0; a < eps_before.size(); ++a) {
     if (eps_after[a] == eps_before[a]) continue;
@@ -182,32 +212,36 @@ void follow_porosity(DoubleState& state, const std::vector<double>& eps_before,
   }
 }
 
-/// [m2] Room for fluid in a full box: the sum of eps dx^2 over a lattice of fluid at rest. Of each
-/// grain it counts as much as the fluid there will feel of it.
-double room_for_fluid(const Scenario& scenario, const DoubleState& with_grains) {
+/// [m3, m2 in 2D] Room for fluid in a full box: the sum of eps dx^D over a lattice of fluid at rest.
+/// Of each grain it counts as much as the fluid there will feel of it.
+template <int D>
+double room_for_fluid(const Scenario& scenario, const DoubleState<D>& with_grains) {
   const double dx = scenario.fluid.spacing;
-  const Box<2> box = domain_box(scenario);
-  DoubleState lattice;
+  const Box<D> box = domain_box<D>(scenario);
+  DoubleState<D> lattice;
   lattice.grains = with_grains.grains;
   const std::int64_t columns = nearest_integer(box.length(0) / dx);
   const std::int64_t rows = nearest_integer(box.length(1) / dx);
+  const auto at = [dx](std::int64_t k) { return (static_cast<double>(k) + 0.5) * dx; };
   for (std::int64_t j = 0; j < rows; ++j)
-    for (std::int64_t i = 0; i < columns; ++i)
-      lattice.fluid.position.emplace_back(box.lower[0] + (static_cast<double>(i) + 0.5) * dx,
-                                          box.lower[1] + (static_cast<double>(j) + 0.5) * dx);
+    for (std::int64_t k = 0; k < lattice_layers<D>(scenario); ++k)
+      for (std::int64_t i = 0; i < columns; ++i)
+        lattice.fluid.position.push_back(box.lower + point<D>(at(i), at(j), at(k)));
   const std::size_t count = lattice.fluid.position.size();
   lattice.fluid.id.resize(count);
-  lattice.fluid.velocity.assign(count, Vec<double, 2>::Zero());
-  lattice.fluid.mass.assign(count, dx * dx);
+  lattice.fluid.velocity.assign(count, Vec<double, D>::Zero());
+  lattice.fluid.mass.assign(count, integer_power<D>(dx));
   lattice.fluid.superficial_density.assign(count, 1.0);
   double sum = 0;
-  for (const double eps : floored_porosity(scenario, lattice)) sum += eps;
-  return sum * dx * dx;
+  for (const double eps : floored_porosity<D>(scenario, lattice)) sum += eps;
+  for (int k = 0; k < D; ++k) sum *= dx;
+  return sum;
 }
 
 /// [m] Height of the fluid beside a side wall: the volume in a strip of four spacings, per width.
-double surface_beside(const Move& move, const DoubleState& state, bool left) {
-  const Box<2> box = move.old_box();
+template <int D>
+double surface_beside(const Move<D>& move, const DoubleState<D>& state, bool left) {
+  const Box<D> box = move.old_box();
   const double strip = std::min(4 * move.before.fluid.spacing, box.length(0));
   double volume = 0;
   for (std::size_t a = 0; a < state.fluid.size(); ++a) {
@@ -215,18 +249,20 @@ double surface_beside(const Move& move, const DoubleState& state, bool left) {
     if (left ? x < box.lower[0] + strip : x >= box.upper[0] - strip)
       volume += state.fluid.mass[a] / state.fluid.superficial_density[a];
   }
-  return std::min(volume / strip, box.length(1));
+  const double area = D == 2 ? strip : strip * box.length(D - 1);
+  return std::min(volume / area, box.length(1));
 }
 
 /// [kg/m3] Mean of rho - rho0 (- the hydrostatic part) over the fluid's volume.
-double mean_excess_density(const Move& move, const DoubleState& state,
+template <int D>
+double mean_excess_density(const Move<D>& move, const DoubleState<D>& state,
                            const std::vector<double>& eps, double surface) {
   double sum = 0, volume = 0;
   for (std::size_t a = 0; a < state.fluid.size(); ++a) {
     const double rhob = state.fluid.superficial_density[a];
     double excess = rhob / eps[a] - move.before.fluid.density;
     if (move.full_pressure())
-      excess -= hydrostatic_excess_density(move.before, state.fluid.position[a], surface);
+      excess -= hydrostatic_excess_density<D>(move.before, state.fluid.position[a], surface);
     const double v = state.fluid.mass[a] / rhob;
     sum += v * excess;
     volume += v;
@@ -241,45 +277,49 @@ struct Columns {
   double surface;  // [m]
 };
 
-void append_particle(const Move& move, const Vec<double, 2>& x, double excess_density,
-                     std::uint64_t id, DoubleState& state) {
+template <int D>
+void append_particle(const Move<D>& move, const Vec<double, D>& x, double excess_density,
+                     std::uint64_t id, DoubleState<D>& state) {
   const Fluid& f = move.before.fluid;
   state.fluid.id.push_back(id);
   state.fluid.position.push_back(x);
-  state.fluid.velocity.push_back(Vec<double, 2>::Zero());
+  state.fluid.velocity.push_back(Vec<double, D>::Zero());
   // Without eps yet, which does not enter m / rhob.
-  state.fluid.mass.push_back(f.density * (f.spacing * f.spacing));
+  state.fluid.mass.push_back(f.density * integer_power<D>(f.spacing));
   state.fluid.superficial_density.push_back(f.density + excess_density);
 }
 
-void append_columns(const Move& move, const std::vector<Columns>& sides, double mean_excess,
-                    DoubleState& state) {
+template <int D>
+void append_columns(const Move<D>& move, const std::vector<Columns>& sides, double mean_excess,
+                    DoubleState<D>& state) {
   const double dx = move.before.fluid.spacing;
-  const Box<2> box = move.old_box();
+  const Box<D> box = move.old_box();
   std::uint64_t id = state.fluid.size() > 0 ? state.fluid.id.back() + 1 : 0;
   std::int64_t rows = 0;
+  const auto at = [dx](std::int64_t k) { return (static_cast<double>(k) + 0.5) * dx; };
   for (const Columns& side : sides) rows = std::max(rows, side.rows);
   for (std::int64_t j = 0; j < rows; ++j)
     for (const Columns& side : sides) {
       if (j >= side.rows) continue;
-      for (std::int64_t k = 0; k < side.columns; ++k) {
-        // From left to right: on the left side the outermost column first.
-        const std::int64_t out = side.left ? side.columns - 1 - k : k;
-        const double away = (static_cast<double>(out) + 0.5) * dx;
-        const Vec<double, 2> x(side.left ? box.lower[0] - away : box.upper[0] + away,
-                               box.lower[1] + (static_cast<double>(j) + 0.5) * dx);
+      // From left to right: on the left side the outermost column first.
+      for (std::int64_t n = 0; n < side.columns * lattice_layers<D>(move.before); ++n) {
+        const std::int64_t k = n % side.columns, layer = n / side.columns;
+        const double away = at(side.left ? side.columns - 1 - k : k);
+        const auto x = point<D>(side.left ? box.lower[0] - away : box.upper[0] + away,
+                                box.lower[1] + at(j), at(layer));
         double excess = mean_excess;
         if (move.full_pressure())
-          excess += hydrostatic_excess_density(move.before, x, side.surface);
+          excess += hydrostatic_excess_density<D>(move.before, x, side.surface);
         append_particle(move, x, excess, id++, state);
       }
     }
 }
 
-void widen_fluid(const Move& move, DoubleState& state, GeometryReport& report) {
+template <int D>
+void widen_fluid(const Move<D>& move, DoubleState<D>& state, GeometryReport& report) {
   const double dx = move.before.fluid.spacing;
   const std::size_t old_count = state.fluid.size();
-  const std::vector<double> eps_before = floored_porosity(move.before, state);
+  const std::vector<double> eps_before = floored_porosity<D>(move.before, state);
   const double height = move.before.domain.height;
   std::vector<Columns> sides;
   for (const bool left : {true, false}) {
@@ -291,7 +331,7 @@ void widen_fluid(const Move& move, DoubleState& state, GeometryReport& report) {
   const double mean =
       move.closed() ? mean_excess_density(move, state, eps_before, height) : 0.0;
   append_columns(move, sides, mean, state);
-  const std::vector<double> eps_after = floored_porosity(move.after, state);
+  const std::vector<double> eps_after = floored_porosity<D>(move.after, state);
   follow_porosity(state, eps_before, eps_after);
   for (std::size_t a = old_count; a < state.fluid.size(); ++a) {
     state.fluid.mass[a] *= eps_after[a];
@@ -301,38 +341,49 @@ void widen_fluid(const Move& move, DoubleState& state, GeometryReport& report) {
 }
 
 /// Distance [m] to the nearest other fluid particle if `a` lay at x.
-double clearance(const DoubleState& state, std::size_t a, const Vec<double, 2>& x,
-                 const Box<2>& box) {
+template <int D>
+double clearance(const DoubleState<D>& state, std::size_t a, const Vec<double, D>& x,
+                 const Box<D>& box) {
   double nearest = std::numeric_limits<double>::infinity();
   for (std::size_t b = 0; b < state.fluid.size(); ++b) {
     if (b == a) continue;
-    const Vec<double, 2> apart = box.separation(x, state.fluid.position[b]);
-    nearest = std::min(nearest, apart[0] * apart[0] + apart[1] * apart[1]);
+    const Vec<double, D> apart = box.separation(x, state.fluid.position[b]);
+    nearest = std::min(nearest, squared<D>(apart));
   }
   return std::sqrt(nearest);
 }
 
 /// Draws fluid that is still outside to dx/2 inside. It may fall onto a particle of the outermost
-/// column, and two at one point would never part: it then goes half a spacing up or down, and where
+/// column, and two at one point would never part: it then goes half a spacing up or down, in 3D
+/// also forward or back, and where
 /// that is taken too half a spacing further in.
-std::uint64_t pull_inside(const Move& move, DoubleState& state) {
+template <int D>
+std::uint64_t pull_inside(const Move<D>& move, DoubleState<D>& state) {
   struct Site {
-    double depth, up;  // in spacings
+    double depth, up, along;  // in spacings
   };
-  constexpr Site sites[] = {{0.5, 0}, {0.5, 0.5}, {0.5, -0.5}, {1, 0}, {1, 0.5}, {1, -0.5}};
+  constexpr Site sites[] = {{0.5, 0, 0},  {0.5, 0.5, 0}, {0.5, -0.5, 0}, {0.5, 0, 0.5},
+                            {0.5, 0, -0.5}, {1, 0, 0},   {1, 0.5, 0},    {1, -0.5, 0},
+                            {1, 0, 0.5},  {1, 0, -0.5}};
   constexpr double enough = 0.49;
   const double dx = move.before.fluid.spacing;
-  const Box<2> box = move.new_box();
+  const Box<D> box = move.new_box();
   std::uint64_t pulled = 0;
   for (std::size_t a = 0; a < state.fluid.size(); ++a) {
-    const Vec<double, 2> x = state.fluid.position[a];
+    const Vec<double, D> x = state.fluid.position[a];
     if (move.beyond(x[0]) <= 0) continue;
     ++pulled;
     double widest = -1;
     for (const Site& site : sites) {
-      const Vec<double, 2> place(move.inside(x[0], site.depth * dx), x[1] + site.up * dx);
-      const bool leaves = place[1] < box.lower[1] || place[1] >= box.upper[1];
-      if (site.up != 0 && leaves) continue;
+      if (D == 2 && site.along != 0) continue;
+      Vec<double, D> place = x;
+      place[0] = move.inside(x[0], site.depth * dx);
+      place[1] += site.up * dx;
+      if constexpr (D == 3) place[2] += site.along * dx;
+      bool leaves = false;
+      for (int k = 1; k < D; ++k)
+        leaves = leaves || place[k] < box.lower[k] || place[k] >= box.upper[k];
+      if ((site.up != 0 || site.along != 0) && leaves) continue;
       const double free = clearance(state, a, place, box);
       if (free <= widest) continue;
       state.fluid.position[a] = place;
@@ -344,14 +395,17 @@ std::uint64_t pull_inside(const Move& move, DoubleState& state) {
 }
 
 /// The fluid without the first `count` of `order`, the rest drawn inside and its masses adjusted.
+template <int D>
 struct Narrowed {
-  DoubleState state;
+  DoubleState<D> state;
   std::uint64_t removed = 0, pulled = 0;
   double mass = 0;
 };
-Narrowed narrowed(const Move& move, const DoubleState& state, const std::vector<double>& eps_before,
-                  const std::vector<std::size_t>& order, std::size_t count) {
-  Narrowed result{state, count, 0, 0};
+template <int D>
+Narrowed<D> narrowed(const Move<D>& move, const DoubleState<D>& state,
+                     const std::vector<double>& eps_before,
+                     const std::vector<std::size_t>& order, std::size_t count) {
+  Narrowed<D> result{state, count, 0, 0};
   std::vector<bool> marked(state.fluid.size(), false);
   for (std::size_t k = 0; k < count; ++k) marked[order[k]] = true;
   auto& fluid = result.state.fluid;
@@ -363,16 +417,19 @@ Narrowed narrowed(const Move& move, const DoubleState& state, const std::vector<
   std::vector<double> eps = eps_before;
   erase_marked(eps, marked);
   result.pulled = pull_inside(move, result.state);
-  follow_porosity(result.state, eps, floored_porosity(move.after, result.state));
+  follow_porosity(result.state, eps, floored_porosity<D>(move.after, result.state));
   result.mass = total_mass(result.state);
   return result;
 }
 
-/// `room_lost` [m2]: swept volume less the volume of grains in it, by which the fluid gets less.
-void narrow_fluid(const Move& move, const std::vector<double>& eps_before, double room_lost,
-                  DoubleState& state, GeometryReport& report) {
+/// `room_lost` [m3, m2 in 2D]: swept volume less the volume of grains in it, by which the fluid gets
+/// less.
+template <int D>
+void narrow_fluid(const Move<D>& move, const std::vector<double>& eps_before, double room_lost,
+                  DoubleState<D>& state, GeometryReport& report) {
   const Fluid& f = move.before.fluid;
-  const double particle = f.density * f.spacing * f.spacing;
+  double particle = f.density;
+  for (int k = 0; k < D; ++k) particle *= f.spacing;
   std::vector<double> beyond(state.fluid.size());
   std::vector<std::size_t> order(state.fluid.size());
   std::size_t outside = 0;
@@ -385,7 +442,7 @@ void narrow_fluid(const Move& move, const std::vector<double>& eps_before, doubl
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t a, std::size_t b) { return beyond[a] > beyond[b]; });
   std::size_t count = outside;
-  Narrowed best = narrowed(move, state, eps_before, order, count);
+  Narrowed<D> best = narrowed(move, state, eps_before, order, count);
   if (move.closed()) {
     const double target = total_mass(state) - f.density * room_lost;
     // Masses adjust to what is removed, so the number is found by correction; a few rounds do.
@@ -396,7 +453,7 @@ void narrow_fluid(const Move& move, const std::vector<double>& eps_before, doubl
           std::max<std::int64_t>(1, nearest_integer(std::abs(off) / particle));
       const std::int64_t next = static_cast<std::int64_t>(best.removed) + (off > 0 ? step : -step);
       if (next < 0 || next > static_cast<std::int64_t>(order.size())) break;
-      Narrowed tried =
+      Narrowed<D> tried =
           narrowed(move, state, eps_before, order, static_cast<std::size_t>(next));
       if (std::abs(tried.mass - target) >= std::abs(off)) break;
       best = std::move(tried);
@@ -464,22 +521,21 @@ SideWalls moved_side_walls(const Scenario& before, double new_width, int anchor)
 template <int D, class P>
 GeometryReport change_width(const Scenario& before, double new_width, const ChangeOptions& options,
                             State<D, P>& state) {
-  static_assert(D == 2, "a scenario describes a width and a height");
   GeometryReport report;
   report.walls = moved_side_walls(before, new_width, options.anchor);
-  Move move{before, before, 0, 0};
+  Move<D> move{before, before, 0, 0};
   move.after.domain.left = report.walls.left;
   move.after.domain.width = report.walls.width;
   const double outward = (new_width - before.domain.width) / (options.anchor == 0 ? 2 : 1);
   if (options.anchor >= 0) move.left_outward = outward;
   if (options.anchor <= 0) move.right_outward = outward;
 
-  DoubleState changed = converted<D, DoublePrecision>(state);
+  DoubleState<D> changed = converted<D, DoublePrecision>(state);
   std::vector<double> eps_before;
   double room_before = 0;
   if (outward < 0) {
     if (before.has_fluid()) {
-      eps_before = floored_porosity(before, changed);
+      eps_before = floored_porosity<D>(before, changed);
       room_before = room_for_fluid(before, changed);
     }
     settle_grains(move, options.outside, changed, report);
@@ -496,14 +552,15 @@ GeometryReport change_width(const Scenario& before, double new_width, const Chan
   return report;
 }
 
-template GeometryReport change_width<2, DoublePrecision>(const Scenario&, double,
-                                                         const ChangeOptions&,
-                                                         State<2, DoublePrecision>&);
-template GeometryReport change_width<2, FloatPrecision>(const Scenario&, double,
-                                                        const ChangeOptions&,
-                                                        State<2, FloatPrecision>&);
-template GeometryReport change_width<2, MixedPrecision>(const Scenario&, double,
-                                                        const ChangeOptions&,
-                                                        State<2, MixedPrecision>&);
+#define VARVE_INSTANTIATE(D, P)                                                  \
+  template GeometryReport change_width<D, P>(const Scenario&, double, const ChangeOptions&, \
+                                             State<D, P>&);
+VARVE_INSTANTIATE(2, DoublePrecision)
+VARVE_INSTANTIATE(2, FloatPrecision)
+VARVE_INSTANTIATE(2, MixedPrecision)
+VARVE_INSTANTIATE(3, DoublePrecision)
+VARVE_INSTANTIATE(3, FloatPrecision)
+VARVE_INSTANTIATE(3, MixedPrecision)
+#undef VARVE_INSTANTIATE
 
 }  // namespace varve::core

@@ -5,6 +5,7 @@
 
 #include "core/constants.h"
 #include "core/coupling.h"
+#include "core/initial_flow.h"
 #include "core/math.h"
 #include "core/random.h"
 #include "core/walls.h"
@@ -13,20 +14,22 @@
 namespace varve::core {
 namespace {
 
-using DoubleState = State<2, DoublePrecision>;
+template <int D>
+using DoubleState = State<D, DoublePrecision>;
 
 // Draws of one id are told apart by number; grains use others than the fluid, since both may have
 // the same seed.
 constexpr std::uint64_t first_fluid_draw = 0, first_grain_draw = 16;
 
-void require_resolved(const Scenario& s) {
+void require_resolved(const Scenario& s, int dimension) {
   const auto need = [](bool given, const char* key) {
     if (!given) throw std::logic_error(std::string("scenario not resolved: ") + key);
   };
   const auto number = [](double value) { return std::isfinite(value); };
-  need(s.domain.dimension == 2, "domain.dimension");
+  need(s.domain.dimension == dimension, "domain.dimension");
   need(number(s.domain.width), "domain.width");
   need(number(s.domain.height), "domain.height");
+  if (dimension == 3) need(number(s.domain.depth), "domain.depth");
   need(number(s.time.dt), "time.dt");
   if (s.has_fluid()) {
     need(number(s.fluid.level), "fluid.level");
@@ -36,6 +39,7 @@ void require_resolved(const Scenario& s) {
   if (s.has_grains()) {
     need(number(s.grains.centre_x), "grains.centre_x");
     need(number(s.grains.lowest_y), "grains.lowest_y");
+    if (dimension == 3) need(number(s.grains.centre_z), "grains.centre_z");
   }
   if (s.is_coupled()) {
     need(number(s.coupling.length), "coupling.length");
@@ -43,61 +47,80 @@ void require_resolved(const Scenario& s) {
   }
 }
 
-Vec<double, 2> jittered(Vec<double, 2> x, double amplitude, std::uint64_t seed, std::uint64_t id,
+/// A point of D coordinates from three.
+template <int D>
+Vec<double, D> point(double x, double y, double z) {
+  if constexpr (D == 2) return {x, y};
+  if constexpr (D == 3) return {x, y, z};
+}
+
+template <int D>
+Vec<double, D> jittered(Vec<double, D> x, double amplitude, std::uint64_t seed, std::uint64_t id,
                         std::uint64_t first_draw) {
   if (amplitude == 0) return x;
-  for (int k = 0; k < 2; ++k)
+  for (int k = 0; k < D; ++k)
     x[k] += amplitude * symmetric(seed, id, first_draw + static_cast<std::uint64_t>(k));
   return x;
 }
 
 /// Positions rounded as they will be stored, so that porosity belongs to what the engine will see.
-template <class P>
-Vec<double, 2> as_stored(const Vec<double, 2>& x) {
-  return x.cast<typename P::Position>().template cast<double>();
+template <int D, class P>
+Vec<double, D> as_stored(const Vec<double, D>& x) {
+  return x.template cast<typename P::Position>().template cast<double>();
 }
 
-template <class P>
-void place_grains(const Scenario& s, DoubleState& state) {
+template <int D, class P>
+void place_grains(const Scenario& s, DoubleState<D>& state) {
   const Grains& g = s.grains;
   const double pitch = g.diameter * (1.0 + g.gap);
-  const Box<2> box = domain_box(s);
+  const Box<D> box = domain_box<D>(s);
   const double first_x = g.centre_x - 0.5 * pitch * static_cast<double>(g.columns - 1);
+  const double first_z = g.centre_z - 0.5 * pitch * static_cast<double>(g.layers - 1);
   for (std::int64_t row = 0; row < g.rows; ++row)
-    for (std::int64_t column = 0; column < g.columns; ++column) {
-      const std::uint64_t id = state.grains.size();
-      const Vec<double, 2> site(first_x + pitch * static_cast<double>(column),
-                                g.lowest_y + pitch * static_cast<double>(row));
-      const Vec<double, 2> x = jittered(site, g.jitter * g.diameter,
-                                        static_cast<std::uint64_t>(g.seed), id, first_grain_draw);
-      state.grains.id.push_back(id);
-      state.grains.species.push_back(0);
-      state.grains.position.push_back(as_stored<P>(box.wrapped(x)));
-      state.grains.velocity.emplace_back(g.velocity_x, g.velocity_y);
-      if (s.contact.rotation) state.grains.spin.push_back(Vec<double, 1>::Zero());
-    }
+    for (std::int64_t layer = 0; layer < g.layers; ++layer)
+      for (std::int64_t column = 0; column < g.columns; ++column) {
+        const std::uint64_t id = state.grains.size();
+        const auto site = point<D>(first_x + pitch * static_cast<double>(column),
+                                   g.lowest_y + pitch * static_cast<double>(row),
+                                   first_z + pitch * static_cast<double>(layer));
+        const Vec<double, D> x =
+            jittered<D>(site, g.jitter * g.diameter, static_cast<std::uint64_t>(g.seed), id,
+                        first_grain_draw);
+        state.grains.id.push_back(id);
+        state.grains.species.push_back(0);
+        state.grains.position.push_back(as_stored<D, P>(box.wrapped(x)));
+        state.grains.velocity.push_back(point<D>(g.velocity_x, g.velocity_y, g.velocity_z));
+        if (s.contact.rotation)
+          state.grains.spin.push_back(Vec<double, spin_components<D>>::Zero());
+      }
 }
 
-template <class P>
-void place_fluid(const Scenario& s, DoubleState& state) {
+template <int D, class P>
+void place_fluid(const Scenario& s, DoubleState<D>& state) {
   const double dx = s.fluid.spacing;
-  const Box<2> box = domain_box(s);
-  const std::int64_t columns = whole_spacings("domain.width", s.domain.width, dx);
+  const Box<D> box = domain_box<D>(s);
+  const bool pipe = D == 3 && s.domain.shape == Shape::pipe;
+  const std::int64_t across = whole_spacings("domain.width", s.domain.width, dx);
+  const std::int64_t columns =
+      std::isnan(s.fluid.width) ? across : whole_spacings("fluid.width", s.fluid.width, dx);
   const std::int64_t rows = nearest_integer(s.fluid.level / dx);
+  const std::int64_t layers = D == 2 ? 1 : whole_spacings("domain.depth", s.domain.depth, dx);
+  const auto at = [dx](std::int64_t k) { return (static_cast<double>(k) + 0.5) * dx; };
   for (std::int64_t j = 0; j < rows; ++j)
-    for (std::int64_t i = 0; i < columns; ++i) {
-      const std::uint64_t id = state.fluid.size();
-      const Vec<double, 2> site(box.lower[0] + (static_cast<double>(i) + 0.5) * dx,
-                                box.lower[1] + (static_cast<double>(j) + 0.5) * dx);
-      const Vec<double, 2> x = jittered(site, s.fluid.jitter * dx,
-                                        static_cast<std::uint64_t>(s.fluid.seed), id,
-                                        first_fluid_draw);
-      state.fluid.id.push_back(id);
-      state.fluid.position.push_back(as_stored<P>(box.wrapped(x)));
-      state.fluid.velocity.push_back(Vec<double, 2>::Zero());
-    }
+    for (std::int64_t k = 0; k < layers; ++k)
+      for (std::int64_t i = 0; i < columns; ++i) {
+        if (pipe && !in_pipe(i, k, across)) continue;
+        const std::uint64_t id = state.fluid.size();
+        const Vec<double, D> site = box.lower + point<D>(at(i), at(j), at(k));
+        const Vec<double, D> x =
+            jittered<D>(site, s.fluid.jitter * dx, static_cast<std::uint64_t>(s.fluid.seed), id,
+                        first_fluid_draw);
+        state.fluid.id.push_back(id);
+        state.fluid.position.push_back(as_stored<D, P>(box.wrapped(x)));
+        state.fluid.velocity.push_back(initial_velocity<D>(s, state.fluid.position.back()));
+      }
   // A volume of dx^D each, until porosity is known: only m / rhob enters it.
-  state.fluid.mass.assign(state.fluid.size(), dx * dx);
+  state.fluid.mass.assign(state.fluid.size(), integer_power<D>(dx));
   state.fluid.superficial_density.assign(state.fluid.size(), 1.0);
 }
 
@@ -119,22 +142,24 @@ std::vector<To> converted_numbers(const std::vector<From>& from) {
 
 }  // namespace
 
-std::vector<double> floored_porosity(const Scenario& scenario, const DoubleState& state) {
-  const Constants<2> c = constants_of<2>(scenario);
+template <int D>
+std::vector<double> floored_porosity(const Scenario& scenario, const DoubleState<D>& state) {
+  const Constants<D> c = constants_of<D>(scenario);
   std::vector<double> porosity(state.fluid.size(), 1.0);
   if (!c.two_way || state.grains.size() == 0 || state.fluid.size() == 0) return porosity;
   std::vector<double> volume(state.fluid.size());
   for (std::size_t a = 0; a < volume.size(); ++a)
     volume[a] = state.fluid.mass[a] / state.fluid.superficial_density[a];
   Workers alone(1);
-  CouplingStage<2, DoublePrecision> coupling;
-  coupling.rebuild(c, state, wall_planes(scenario), 0.0, alone);
+  CouplingStage<D, DoublePrecision> coupling;
+  coupling.rebuild(c, state, domain_walls(scenario), 0.0, alone);
   std::vector<double> unfloored(state.fluid.size());
   coupling.porosity(c, state, volume, unfloored, porosity, alone);
   return porosity;
 }
 
-double hydrostatic_excess_density(const Scenario& scenario, const Vec<double, 2>& x,
+template <int D>
+double hydrostatic_excess_density(const Scenario& scenario, const Vec<double, D>& x,
                                   double surface) {
   const Domain& d = scenario.domain;
   const double down = scenario.gravity.magnitude * cos(scenario.gravity.tilt);
@@ -170,20 +195,21 @@ State<D, To> converted(const State<D, From>& from) {
 
 template <int D, class P>
 State<D, P> first_state(const Scenario& resolved) {
-  static_assert(D == 2, "a scenario describes a width and a height");
-  require_resolved(resolved);
-  DoubleState state;
+  require_resolved(resolved, D);
+  DoubleState<D> state;
   state.clock.dt = resolved.time.dt;
-  if (resolved.has_grains()) place_grains<P>(resolved, state);
+  if (resolved.has_grains()) place_grains<D, P>(resolved, state);
   if (resolved.has_fluid()) {
-    place_fluid<P>(resolved, state);
-    const std::vector<double> eps = floored_porosity(resolved, state);
+    place_fluid<D, P>(resolved, state);
+    const std::vector<double> eps = floored_porosity<D>(resolved, state);
     const bool full = resolved.fluid.pressure == PressureForm::full;
-    const double volume = resolved.fluid.spacing * resolved.fluid.spacing;
+    const double volume = integer_power<D>(resolved.fluid.spacing);
     for (std::size_t a = 0; a < state.fluid.size(); ++a) {
       double rho = resolved.fluid.density;
       if (full)
-        rho += hydrostatic_excess_density(resolved, state.fluid.position[a], resolved.fluid.level);
+        rho += hydrostatic_excess_density<D>(resolved, state.fluid.position[a],
+                                             resolved.fluid.level);
+      rho += initial_excess_density<D>(resolved, state.fluid.position[a]);
       state.fluid.superficial_density[a] = eps[a] * rho;
       state.fluid.mass[a] = eps[a] * rho * volume;
     }
@@ -191,13 +217,24 @@ State<D, P> first_state(const Scenario& resolved) {
   return converted<D, P>(state);
 }
 
-template State<2, DoublePrecision> first_state<2, DoublePrecision>(const Scenario&);
-template State<2, FloatPrecision> first_state<2, FloatPrecision>(const Scenario&);
-template State<2, MixedPrecision> first_state<2, MixedPrecision>(const Scenario&);
-template State<2, DoublePrecision> converted<2, DoublePrecision>(const State<2, DoublePrecision>&);
-template State<2, DoublePrecision> converted<2, DoublePrecision>(const State<2, FloatPrecision>&);
-template State<2, DoublePrecision> converted<2, DoublePrecision>(const State<2, MixedPrecision>&);
-template State<2, FloatPrecision> converted<2, FloatPrecision>(const State<2, DoublePrecision>&);
-template State<2, MixedPrecision> converted<2, MixedPrecision>(const State<2, DoublePrecision>&);
+#define VARVE_INSTANTIATE(D)                                                                     \
+  template State<D, DoublePrecision> first_state<D, DoublePrecision>(const Scenario&);           \
+  template State<D, FloatPrecision> first_state<D, FloatPrecision>(const Scenario&);             \
+  template State<D, MixedPrecision> first_state<D, MixedPrecision>(const Scenario&);             \
+  template std::vector<double> floored_porosity<D>(const Scenario&, const DoubleState<D>&);      \
+  template double hydrostatic_excess_density<D>(const Scenario&, const Vec<double, D>&, double); \
+  template State<D, DoublePrecision> converted<D, DoublePrecision>(                              \
+      const State<D, DoublePrecision>&);                                                         \
+  template State<D, DoublePrecision> converted<D, DoublePrecision>(                              \
+      const State<D, FloatPrecision>&);                                                          \
+  template State<D, DoublePrecision> converted<D, DoublePrecision>(                              \
+      const State<D, MixedPrecision>&);                                                          \
+  template State<D, FloatPrecision> converted<D, FloatPrecision>(                                \
+      const State<D, DoublePrecision>&);                                                         \
+  template State<D, MixedPrecision> converted<D, MixedPrecision>(                                \
+      const State<D, DoublePrecision>&);
+VARVE_INSTANTIATE(2)
+VARVE_INSTANTIATE(3)
+#undef VARVE_INSTANTIATE
 
 }  // namespace varve::core

@@ -46,11 +46,14 @@ PairSweeps<D, P> pair_sweeps(Kernel kernel, bool periodic, InstructionSet set) {
   return isa_baseline::sweeps<D, P>(kernel, periodic);
 }
 
-template PairSweeps<2, DoublePrecision> pair_sweeps<2, DoublePrecision>(Kernel, bool,
-                                                                        InstructionSet);
-template PairSweeps<2, FloatPrecision> pair_sweeps<2, FloatPrecision>(Kernel, bool,
-                                                                      InstructionSet);
-template PairSweeps<2, MixedPrecision> pair_sweeps<2, MixedPrecision>(Kernel, bool,
-                                                                      InstructionSet);
+#define VARVE_INSTANTIATE(D, P) \
+  template PairSweeps<D, P> pair_sweeps<D, P>(Kernel, bool, InstructionSet);
+VARVE_INSTANTIATE(2, DoublePrecision)
+VARVE_INSTANTIATE(2, FloatPrecision)
+VARVE_INSTANTIATE(2, MixedPrecision)
+VARVE_INSTANTIATE(3, DoublePrecision)
+VARVE_INSTANTIATE(3, FloatPrecision)
+VARVE_INSTANTIATE(3, MixedPrecision)
+#undef VARVE_INSTANTIATE
 
 }  // namespace varve::core

@@ -330,5 +330,8 @@ PairSweeps<D, P> sweeps(Kernel kernel, bool periodic) {
 template PairSweeps<2, DoublePrecision> sweeps<2, DoublePrecision>(Kernel, bool);
 template PairSweeps<2, FloatPrecision> sweeps<2, FloatPrecision>(Kernel, bool);
 template PairSweeps<2, MixedPrecision> sweeps<2, MixedPrecision>(Kernel, bool);
+template PairSweeps<3, DoublePrecision> sweeps<3, DoublePrecision>(Kernel, bool);
+template PairSweeps<3, FloatPrecision> sweeps<3, FloatPrecision>(Kernel, bool);
+template PairSweeps<3, MixedPrecision> sweeps<3, MixedPrecision>(Kernel, bool);
 
 }  // namespace varve::core::VARVE_ISA

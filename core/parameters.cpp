@@ -18,6 +18,8 @@ constexpr std::array coupling_modes{"two_way"sv, "one_way"sv, "off"sv};
 constexpr std::array drags{"stokes"sv, "schiller_naumann"sv, "dallavalle_di_felice"sv, "gidaspow"sv,
                            "cylinder"sv};
 constexpr std::array kernels{"wendland_c2"sv, "cubic"sv, "quintic"sv};
+constexpr std::array shapes{"box"sv, "pipe"sv};
+constexpr std::array flows{"rest"sv, "uniform"sv, "shear"sv, "taylor_green"sv};
 constexpr std::array motions{"free"sv, "frozen"sv};
 constexpr std::array tiers{"deltas"sv, "digests"sv};
 
@@ -82,18 +84,29 @@ void add_scene(std::vector<Parameter>& table) {
 
   add(whole("domain.dimension", {2, 3}, Change::never, VARVE_WHOLE(domain.dimension),
             "2: discs, everything per metre of depth; 3: spheres"));
+  add(choice("domain.shape", shapes, Change::never, VARVE_CHOICE(domain.shape),
+             "pipe: an upright round pipe, as wide as domain.width; 3D only"));
   add(real("domain.width", "m", length, positive, given, Change::geometry, VARVE_REAL(domain.width),
-           "extent in x"));
+           "extent in x; diameter of a pipe"));
   add(real("domain.height", "m", length, positive, given, Change::never, VARVE_REAL(domain.height),
            "extent in y, from the bottom at y = 0"));
+  add(real("domain.depth", "m", length, positive, automatic_ok, Change::never,
+           VARVE_REAL(domain.depth),
+           "extent in z, from the front at z = 0; 3D only, auto in 2D and for a pipe"));
   add(real("domain.left", "m", length, any, given, Change::never, VARVE_REAL(domain.left),
            "x of the left side; moves when the width changes"));
   add(choice("domain.sides", Names(boundaries).first(3), Change::never, VARVE_CHOICE(domain.sides),
-             "left and right"));
+             "left and right; the wall of a pipe"));
   add(choice("domain.bottom", Names(boundaries).first(3), Change::never,
              VARVE_CHOICE(domain.bottom), "periodic only together with the top"));
   add(choice("domain.top", boundaries, Change::never, VARVE_CHOICE(domain.top),
              "free: a free surface, no lid"));
+  add(choice("domain.faces", Names(boundaries).first(3), Change::never, VARVE_CHOICE(domain.faces),
+             "front and back, in 3D; a pipe has none"));
+  add(real("domain.lid_speed", "m/s", speed, {-1e6, 1e6}, given, Change::never,
+           VARVE_REAL(domain.lid_speed), "of a no-slip top along x: a moving lid"));
+  add(real("domain.floor_speed", "m/s", speed, {-1e6, 1e6}, given, Change::never,
+           VARVE_REAL(domain.floor_speed), "of a no-slip bottom along x"));
 
   add(real("gravity.magnitude", "m/s2", acceleration, {0, 1e6}, given, Change::parameter,
            VARVE_REAL(gravity.magnitude), "0: none"));
@@ -110,6 +123,9 @@ void add_scene(std::vector<Parameter>& table) {
            "of the first lattice of fluid particles: the resolution"));
   add(real("fluid.level", "m", length, positive, automatic_ok, Change::never,
            VARVE_REAL(fluid.level), "filling height above the bottom; auto: the domain's height"));
+  add(real("fluid.width", "m", length, positive, automatic_ok, Change::never,
+           VARVE_REAL(fluid.width),
+           "filled at the start, from the left wall: a column behind a dam; auto: all of it"));
   add(choice("fluid.kernel", kernels, Change::never, VARVE_CHOICE(fluid.kernel),
              "smoothing kernel; cubic lets particles pair up"));
   add(real("fluid.smoothing_ratio", "", pure, {0.8, 4}, given, Change::never,
@@ -128,6 +144,13 @@ void add_scene(std::vector<Parameter>& table) {
            VARVE_REAL(fluid.body_force_x), "acceleration of the fluid alone, along x"));
   add(real("fluid.body_force_y", "m/s2", acceleration, {-1e6, 1e6}, given, Change::never,
            VARVE_REAL(fluid.body_force_y), "acceleration of the fluid alone, along y"));
+  add(real("fluid.body_force_z", "m/s2", acceleration, {-1e6, 1e6}, given, Change::never,
+           VARVE_REAL(fluid.body_force_z), "acceleration of the fluid alone, along z; 3D only"));
+  add(choice("fluid.initial", flows, Change::never, VARVE_CHOICE(fluid.initial),
+             "flow at the start; shear: along x, from 0 at the bottom to full speed at the top; "
+             "taylor_green: vortices, one wave across the domain"));
+  add(real("fluid.initial_speed", "m/s", speed, {-1e6, 1e6}, given, Change::never,
+           VARVE_REAL(fluid.initial_speed), "amplitude of the flow at the start"));
 }
 
 void add_grains(std::vector<Parameter>& table) {
@@ -136,6 +159,8 @@ void add_grains(std::vector<Parameter>& table) {
             "of the array, upwards; 0: no grains"));
   add(whole("grains.columns", {0, counts}, Change::never, VARVE_WHOLE(grains.columns),
             "of the array, along x; 0: no grains"));
+  add(whole("grains.layers", {1, counts}, Change::never, VARVE_WHOLE(grains.layers),
+            "of the array, along z; 1 in 2D"));
   add(real("grains.diameter", "m", length, positive, given, Change::never,
            VARVE_REAL(grains.diameter), "of a disc or sphere"));
   add(real("grains.density", "kg/m3", density, {0, 1e9, true}, given, Change::never,
@@ -145,6 +170,8 @@ void add_grains(std::vector<Parameter>& table) {
   add(real("grains.lowest_y", "m", length, any, automatic_ok, Change::never,
            VARVE_REAL(grains.lowest_y),
            "y of the lowest row's centres; auto: the array is centred"));
+  add(real("grains.centre_z", "m", length, any, automatic_ok, Change::never,
+           VARVE_REAL(grains.centre_z), "z of the array's middle; 3D only, auto: the domain's"));
   add(real("grains.gap", "", pure, {0, 1e3}, given, Change::never, VARVE_REAL(grains.gap),
            "free space between neighbours, over diameter"));
   add(real("grains.jitter", "", pure, {0, 0.5}, given, Change::never, VARVE_REAL(grains.jitter),
@@ -154,6 +181,8 @@ void add_grains(std::vector<Parameter>& table) {
            VARVE_REAL(grains.velocity_x), "at the start"));
   add(real("grains.velocity_y", "m/s", speed, {-1e6, 1e6}, given, Change::never,
            VARVE_REAL(grains.velocity_y), "at the start"));
+  add(real("grains.velocity_z", "m/s", speed, {-1e6, 1e6}, given, Change::never,
+           VARVE_REAL(grains.velocity_z), "at the start; 3D only"));
   add(choice("grains.motion", motions, Change::never, VARVE_CHOICE(grains.motion),
              "frozen: held in place, felt by the fluid"));
 

@@ -65,7 +65,9 @@ class Resolver {
     if (std::isnan(s_.domain.height))
       problem("domain.height", "missing; expected a length > 0, such as '12 cm'");
     if (s_.domain.dimension == 3)
-      problem("domain.dimension", "3 is not built into this version; expected 2");
+      check_solid();
+    else
+      check_flat();
     if (!s_.has_fluid() && !s_.has_grains())
       problem("fluid.present", "neither fluid nor grains: there is nothing to simulate");
     const bool bottom = s_.domain.bottom == Boundary::periodic;
@@ -73,7 +75,48 @@ class Resolver {
     if (bottom != top)
       problem(bottom ? "domain.bottom" : "domain.top",
               "periodic on one side only; bottom and top must both be periodic");
+    const auto check_speed = [&](const char* key, double speed, Boundary wall, const char* side) {
+      if (speed != 0 && wall != Boundary::no_slip)
+        problem(key, number_text(speed) + " m/s moves nothing: " + side +
+                         " is not no_slip; expected 0, or " + side + " = no_slip");
+    };
+    check_speed("domain.lid_speed", s_.domain.lid_speed, s_.domain.top, "domain.top");
+    check_speed("domain.floor_speed", s_.domain.floor_speed, s_.domain.bottom, "domain.bottom");
     return problems_.empty();
+  }
+
+  /// What only three dimensions have.
+  void check_flat() {
+    const auto absent = [&](bool given, const char* key, const char* expected) {
+      if (given)
+        problem(key, "has no meaning in 2D, where all is per metre of depth; expected " +
+                         std::string(expected) + ", or domain.dimension = 3");
+    };
+    absent(s_.domain.shape == Shape::pipe, "domain.shape", "box");
+    absent(!std::isnan(s_.domain.depth), "domain.depth", "auto");
+    absent(s_.domain.faces != Boundary::no_slip, "domain.faces", "no_slip");
+    absent(s_.fluid.body_force_z != 0, "fluid.body_force_z", "0");
+    absent(s_.grains.layers != 1, "grains.layers", "1");
+    absent(!std::isnan(s_.grains.centre_z), "grains.centre_z", "auto");
+    absent(s_.grains.velocity_z != 0, "grains.velocity_z", "0");
+  }
+
+  void check_solid() {
+    Domain& d = s_.domain;
+    if (d.shape == Shape::box) {
+      if (std::isnan(d.depth))
+        problem("domain.depth", "missing; expected a length > 0, such as '2 cm'");
+      return;
+    }
+    if (std::isnan(d.depth)) d.depth = d.width;
+    if (d.depth != d.width)
+      problem("domain.depth", number_text(d.depth) +
+                                  " m: a pipe is as deep as it is wide; expected auto or " +
+                                  number_text(d.width) + " m (domain.width)");
+    if (d.sides == Boundary::periodic)
+      problem("domain.sides", "the side of a pipe is a wall; expected no_slip or free_slip");
+    if (d.faces != Boundary::no_slip)
+      problem("domain.faces", "a pipe has none: domain.sides is its wall; expected no_slip");
   }
 
   /// An extent filled by the lattice must hold a whole number of spacings.
@@ -105,16 +148,60 @@ class Resolver {
     if (s_.domain.top == Boundary::periodic && s_.fluid.level < s_.domain.height)
       problem("fluid.level", "bottom and top are periodic: the domain must be full; expected " +
                                  number_text(s_.domain.height) + " m or auto");
+    resolve_column();
     check_lattice("domain.width", s_.domain.width);
     check_lattice(s_.fluid.level == s_.domain.height ? "domain.height" : "fluid.level",
                   s_.fluid.level);
-    const double particles =
+    double particles =
         (s_.domain.width / s_.fluid.spacing) * (s_.fluid.level / s_.fluid.spacing);
+    if (s_.domain.dimension == 3) {
+      check_lattice("domain.depth", s_.domain.depth);
+      particles *= s_.domain.depth / s_.fluid.spacing;
+    }
+    check_initial_flow();
     if (problems_.empty() && particles > particles_max)
       problem("fluid.spacing", number_text(s_.fluid.spacing) + " m makes " +
                                    rough_number(particles) + " fluid particles; at most " +
                                    rough_number(particles_max) + " are possible");
     resolve_pressure();
+  }
+
+  /// A column of fluid that does not reach the right wall.
+  void resolve_column() {
+    double& width = s_.fluid.width;
+    if (std::isnan(width)) return;
+    if (width > s_.domain.width * (1 + rounding))
+      problem("fluid.width", number_text(width) + " m is wider than the domain; largest value " +
+                                 number_text(s_.domain.width) + " m (domain.width)");
+    // The whole width is no width of its own: the domain's may change later.
+    if (width >= s_.domain.width * (1 - rounding)) {
+      width = automatic;
+      return;
+    }
+    check_lattice("fluid.width", width);
+    if (s_.domain.sides == Boundary::periodic || s_.domain.shape == Shape::pipe)
+      problem("fluid.width", "a column stands against the left wall of a box; expected auto");
+  }
+
+  void check_initial_flow() {
+    const Domain& d = s_.domain;
+    if (s_.fluid.initial == InitialFlow::shear && d.bottom == Boundary::periodic)
+      problem("fluid.initial", "'shear' jumps where bottom meets top, which are periodic; expected "
+                               "walls there, or another flow");
+    if (s_.fluid.initial != InitialFlow::taylor_green) return;
+    const auto check = [&](const char* key, Boundary side) {
+      if (side == Boundary::no_slip || side == Boundary::free)
+        problem(key, "fluid.initial = taylor_green slides along this side; expected periodic or "
+                     "free_slip");
+    };
+    if (d.dimension == 3 && d.shape == Shape::pipe)
+      problem("domain.shape", "fluid.initial = taylor_green needs a box");
+    check("domain.sides", d.sides);
+    check("domain.bottom", d.bottom);
+    check("domain.top", d.top);
+    if (d.dimension == 3) check("domain.faces", d.faces);
+    if (has_free_surface(s_))
+      problem("fluid.level", "fluid.initial = taylor_green fills the domain; expected auto");
   }
 
   void resolve_pressure() {
@@ -136,7 +223,7 @@ class Resolver {
     if (!s_.has_grains()) return;
     const double rows = static_cast<double>(s_.grains.rows);
     const double columns = static_cast<double>(s_.grains.columns);
-    const double count = rows * columns;
+    const double count = rows * columns * static_cast<double>(s_.grains.layers);
     if (count > grains_max) {
       problem("grains.rows", rough_number(count) + " grains; at most " + rough_number(grains_max) +
                                  " are possible");
@@ -154,6 +241,7 @@ class Resolver {
                  s_.domain.sides == Boundary::periodic, "wide", "columns");
     check_inside("grains.lowest_y", 0, s_.domain.height, s_.grains.lowest_y, array_height,
                  s_.domain.bottom == Boundary::periodic, "high", "rows");
+    if (s_.domain.dimension == 3) check_depth_of_array(half_width);
     if (count > 1 && s_.grains.jitter > 0.5 * s_.grains.gap * (1 + rounding))
       problem("grains.jitter", number_text(s_.grains.jitter) +
                                    " can make neighbours overlap; largest safe value " +
@@ -164,6 +252,24 @@ class Resolver {
       const double frequency = pi / s_.contact.time;
       s_.contact.stiffness = grain_mass(s_) * (frequency * frequency);
     }
+  }
+
+  void check_depth_of_array(double half_width) {
+    const double half_depth =
+        0.5 * static_cast<double>(s_.grains.layers - 1) * grain_pitch(s_);
+    if (std::isnan(s_.grains.centre_z)) s_.grains.centre_z = 0.5 * s_.domain.depth;
+    check_inside("grains.centre_z", 0, s_.domain.depth, s_.grains.centre_z - half_depth,
+                 2 * half_depth, s_.domain.faces == Boundary::periodic, "deep", "layers");
+    if (s_.domain.shape != Shape::pipe) return;
+    const double radius = 0.5 * s_.domain.width;
+    const double x = std::abs(s_.grains.centre_x - s_.domain.left - radius) + half_width;
+    const double z = std::abs(s_.grains.centre_z - radius) + half_depth;
+    const double reach = s_.grains.diameter * (0.5 + 1.5 * s_.grains.jitter);
+    const double corner = std::sqrt(x * x + z * z) + reach;
+    if (corner > radius * (1 + rounding))
+      problem("grains.columns", "a corner of the array reaches " + rough_number(corner) +
+                                    " m from the pipe's axis; its radius is " +
+                                    number_text(radius) + " m");
   }
 
   /// Grains whose first centre lies at `first` and whose last lies `span` further must fit between
@@ -185,7 +291,7 @@ class Resolver {
     const double low = from + reach, high = from + extent - reach - span;
     if (first >= low - slack && first <= high + slack) return;
     // The key names the middle of the columns but the first of the rows.
-    const double shift = key == "grains.centre_x" ? 0.5 * span : 0.0;
+    const double shift = key == "grains.lowest_y" ? 0.0 : 0.5 * span;
     problem(key, number_text(first + shift) + " m puts grains outside the domain; expected " +
                      rough_number(low + shift) + ".." + rough_number(high + shift) + " m");
   }
@@ -223,6 +329,7 @@ class Resolver {
     };
     check(s_.domain.sides, "domain.width", s_.domain.width);
     check(s_.domain.bottom, "domain.height", s_.domain.height);
+    if (s_.domain.dimension == 3) check(s_.domain.faces, "domain.depth", s_.domain.depth);
   }
 
   void resolve_sound_speed() {

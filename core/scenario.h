@@ -18,6 +18,8 @@ enum class CouplingMode { two_way, one_way, off };
 enum class Drag { stokes, schiller_naumann, dallavalle_di_felice, gidaspow, cylinder };
 enum class Kernel { wendland_c2, cubic, quintic };
 enum class GrainMotion { free, frozen };
+enum class Shape { box, pipe };
+enum class InitialFlow { rest, uniform, shear, taylor_green };
 enum class RecordTier { deltas, digests };
 /// What becomes of grains that a narrower width leaves outside.
 enum class OutsideMode { error, push, remove };
@@ -27,11 +29,15 @@ inline constexpr double automatic = std::numeric_limits<double>::quiet_NaN();
 
 struct Domain {
   std::int64_t dimension = 2;
+  Shape shape = Shape::box;  // pipe: round, upright, width across; 3D
   double width = automatic, height = automatic;  // [m] x and y extent at the start
+  double depth = automatic;              // [m] z extent, from 0; stays automatic in 2D
   double left = 0;                       // [m] x of the left wall; moves when the width changes
   Boundary sides = Boundary::no_slip;    // no_slip, free_slip, periodic
   Boundary bottom = Boundary::no_slip;   // no_slip, free_slip, periodic (then top too)
   Boundary top = Boundary::no_slip;      // no_slip, free_slip, periodic, free (free surface)
+  Boundary faces = Boundary::no_slip;    // front and back, 3D: no_slip, free_slip, periodic
+  double lid_speed = 0, floor_speed = 0;  // [m/s] of the top and bottom walls in themselves, +x
 };
 
 struct Gravity {
@@ -45,6 +51,7 @@ struct Fluid {
   double viscosity = 0.01;     // [Pa s] mu
   double spacing = 1e-3;       // [m] dx of the first lattice
   double level = automatic;    // [m] filling height above the bottom; else the domain's height
+  double width = automatic;    // [m] filled from the left wall; stays automatic for all of it
   Kernel kernel = Kernel::wendland_c2;
   double smoothing_ratio = 1.25;   // [-] smoothing_length / spacing
   double sound_speed = automatic;  // [m/s] c0
@@ -52,19 +59,23 @@ struct Fluid {
   double density_diffusion = 0.1;  // [-] delta of delta-SPH
   double jitter = 0;               // [-] of the spacing
   std::int64_t seed = 1;
-  double body_force_x = 0, body_force_y = 0;  // [m/s2]
+  double body_force_x = 0, body_force_y = 0, body_force_z = 0;  // [m/s2]
+  InitialFlow initial = InitialFlow::rest;
+  double initial_speed = 0;  // [m/s] amplitude of the initial flow
 };
 
 struct Grains {
   std::int64_t rows = 0, columns = 0;  // no grains if either is 0
+  std::int64_t layers = 1;             // along z; 1 in 2D
   double diameter = 2.5e-3;            // [m]
   double density = 2500;               // [kg/m3]
   double centre_x = automatic;         // [m] middle of the array; the domain's middle if not given
   double lowest_y = automatic;         // [m] centre of the lowest row
+  double centre_z = automatic;         // [m] as centre_x; stays automatic in 2D
   double gap = 0;                      // [-] of the diameter, between neighbours
   double jitter = 0;                   // [-] of the diameter
   std::int64_t seed = 1;
-  double velocity_x = 0, velocity_y = 0;  // [m/s] at the start
+  double velocity_x = 0, velocity_y = 0, velocity_z = 0;  // [m/s] at the start
   GrainMotion motion = GrainMotion::free;
 };
 
@@ -133,7 +144,7 @@ struct Scenario {
   std::vector<ScheduledChange> changes;  // in order of at_step, then of the file
 
   bool has_fluid() const { return fluid.present; }
-  bool has_grains() const { return grains.rows > 0 && grains.columns > 0; }
+  bool has_grains() const { return grains.rows > 0 && grains.columns > 0 && grains.layers > 0; }
   bool is_coupled() const {
     return has_fluid() && has_grains() && coupling.mode != CouplingMode::off;
   }

@@ -27,14 +27,13 @@ namespace {
 /// Calls `make` with the dimension and precision of the scenario as types.
 template <class Make>
 auto dispatch(const Scenario& scenario, Make&& make) {
-  if (scenario.domain.dimension != 2)
-    throw ModelError("domain.dimension = " + std::to_string(scenario.domain.dimension) +
-                     " is not built in; 2 is");
-  if (scenario.precision == Precision::float_)
-    return make(std::integral_constant<int, 2>{}, FloatPrecision{});
-  if (scenario.precision == Precision::mixed)
-    return make(std::integral_constant<int, 2>{}, MixedPrecision{});
-  return make(std::integral_constant<int, 2>{}, DoublePrecision{});
+  const auto with_precision = [&](auto dimension) {
+    if (scenario.precision == Precision::float_) return make(dimension, FloatPrecision{});
+    if (scenario.precision == Precision::mixed) return make(dimension, MixedPrecision{});
+    return make(dimension, DoublePrecision{});
+  };
+  if (scenario.domain.dimension == 3) return with_precision(std::integral_constant<int, 3>{});
+  return with_precision(std::integral_constant<int, 2>{});
 }
 
 }  // namespace

@@ -77,8 +77,10 @@ std::string report(const ScenarioSource& source, const core::Assessment& a) {
   if (s.has_fluid()) {
     const core::Lattice lattice = core::fluid_lattice(s);
     text += "\nfluid\n";
-    text += row("particles", fmt::format("{} ({} x {})", a.fluid_particles, lattice.columns,
-                                         lattice.rows));
+    std::string sites = fmt::format("{} x {}", lattice.columns, lattice.rows);
+    if (s.domain.dimension == 3) sites += fmt::format(" x {}", lattice.layers);
+    if (lattice.particles < lattice.columns * lattice.rows * lattice.layers) sites += ", round";
+    text += row("particles", fmt::format("{} ({})", a.fluid_particles, sites));
     text += row("mass", fmt::format("{:.6g} kg{}", a.fluid_mass, per));
     text += row("expected speed", fmt::format("{:.4g} m/s  {}", a.speeds.fluid,
                                               a.speeds.fluid_reason));

@@ -37,12 +37,12 @@ Constants<2> disc_constants() {
   return c;
 }
 
-WallPlane floor_plane() { return {wall_bottom, Boundary::no_slip, 1, 0.0, 1.0}; }
+Wall floor_plane() { return {wall_bottom, Boundary::no_slip, 1, 0.0, 1.0}; }
 
 /// Grains, contacts and what acts on them, advanced step by step.
 struct Rig {
   Constants<2> c = disc_constants();
-  std::vector<WallPlane> walls;
+  std::vector<Wall> walls;
   GrainState<2, P> grains;
   ContactState<2, P> contacts;
   std::vector<OuterForce<2>> outer;

@@ -22,7 +22,7 @@ struct Bed {
   Constants<2> c;
   State<2, P> state;
   std::vector<V2> stress;
-  std::vector<WallPlane> walls;
+  std::vector<Wall> walls;
   std::vector<double> volume, porosity, floored;
   Workers workers{1};
   CouplingStage<2, P> stage;
@@ -139,7 +139,7 @@ TEST(CouplingPorosity, OfAHexagonalArrayInContactIsOneMinusPiOverTwoRootThree) {
 }
 
 /// Walls around a bed of `side` metres.
-std::vector<WallPlane> box_walls(double side) {
+std::vector<Wall> box_walls(double side) {
   return {{wall_left, Boundary::no_slip, 0, 0.0, 1.0},
           {wall_right, Boundary::no_slip, 0, side, -1.0},
           {wall_bottom, Boundary::no_slip, 1, 0.0, 1.0},

@@ -14,10 +14,10 @@ namespace {
 using scenes::resolved;
 using testing::HasSubstr;
 
-TEST(WallPlanes, AreNumberedLeftRightBottomTop) {
+TEST(Walls, AreNumberedLeftRightBottomTop) {
   Scenario s = resolved(scenes::box());
   s.domain.left = -0.005;
-  const std::vector<WallPlane> walls = wall_planes(s);
+  const std::vector<Wall> walls = domain_walls(s);
   ASSERT_EQ(walls.size(), 4u);
   const double at[] = {-0.005, 0.015, 0, 0.03};
   const double inward[] = {1, -1, 1, -1};
@@ -34,10 +34,10 @@ TEST(WallPlanes, AreNumberedLeftRightBottomTop) {
   EXPECT_DOUBLE_EQ(distance_inside(walls[3], x), 0.02);
 }
 
-TEST(WallPlanes, PeriodicSidesAndAFreeTopAreNone) {
+TEST(Walls, PeriodicSidesAndAFreeTopAreNone) {
   Scenario s = scenes::tank();
   s.domain.sides = Boundary::periodic;
-  const std::vector<WallPlane> walls = wall_planes(resolved(s));
+  const std::vector<Wall> walls = domain_walls(resolved(s));
   ASSERT_EQ(walls.size(), 1u);
   EXPECT_EQ(walls[0].number, wall_bottom);
 }

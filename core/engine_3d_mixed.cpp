@@ -1,0 +1,5 @@
+#include "core/engine_impl.h"
+
+namespace varve::core {
+template class Engine<3, MixedPrecision>;
+}
