@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/arithmetic.h"
 #include "core/constants.h"
 #include "core/contacts.h"
 #include "core/coupling.h"

@@ -18,6 +18,7 @@ Engine<D, P>::Engine(const Scenario& scenario, State<D, P> state, const RunOptio
                            : std::min(best_instruction_set(),
                                       static_cast<InstructionSet>(options.instruction_set))),
       options_(options) {
+  require_exact_arithmetic(workers_);
   adopt_scenario();
   build_fields();
   build_tables();

@@ -2,6 +2,7 @@
 
 #include <type_traits>
 
+#include "core/arithmetic.h"
 #include "core/engine.h"
 #include "core/initial.h"
 #include "core/units.h"
@@ -27,6 +28,7 @@ namespace {
 /// Calls `make` with the dimension and precision of the scenario as types.
 template <class Make>
 auto dispatch(const Scenario& scenario, Make&& make) {
+  require_exact_arithmetic();
   const auto with_precision = [&](auto dimension) {
     if (scenario.precision == Precision::float_) return make(dimension, FloatPrecision{});
     if (scenario.precision == Precision::mixed) return make(dimension, MixedPrecision{});

@@ -134,7 +134,8 @@ struct FluidReport {
 
 class Simulation {
  public:
-  /// The first state of a resolved scenario (changes scheduled for step 0 applied).
+  /// The first state of a resolved scenario (changes scheduled for step 0 applied). This and
+  /// restore() throw ArithmeticError where a thread does not compute as IEEE 754 says by default.
   static std::unique_ptr<Simulation> create(const Scenario& resolved, const RunOptions& options);
   /// The engine with `resolved` as it stood at genesis, holding a recorded state: changes scheduled
   /// up to the state's step are taken as done. Throws ModelError if the values do not fit the field

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "core/arithmetic.h"
 #include "core/assessment.h"
 #include "core/parameters.h"
 #include "io/errors.h"
@@ -38,6 +39,8 @@ auto translated(const Work& work) {
                                          {"advice", failure.advice}});
   } catch (const core::ModelError& error) {
     throw UsageError(error.what());
+  } catch (const core::ArithmeticError& error) {
+    throw ToolError(exit_internal, error.what());
   }
 }
 
@@ -141,6 +144,8 @@ void SimulationEngine::restore(const io::FrameView& frame) {
     take(core::Simulation::restore(genesis_scenario_, values, options_));
   } catch (const core::ModelError& error) {
     throw io::LogError(io::ErrorKind::mismatch, "", error.what());
+  } catch (const core::ArithmeticError& error) {
+    throw ToolError(exit_internal, error.what());
   }
 }
 

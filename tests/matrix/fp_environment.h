@@ -9,13 +9,7 @@ namespace varve::tests {
 double contraction_residue();
 float contraction_residue_float();
 
-/// True if this thread rounds to nearest, ties to even.
-bool rounds_to_nearest();
-
-/// True if this thread computes and reads subnormal numbers instead of flushing them to zero.
-bool keeps_subnormals();
-
-/// Throws std::runtime_error naming what is wrong in this thread.
+/// Throws std::runtime_error naming what is wrong in this thread: fusing, rounding, subnormals.
 void require_strict_floating_point();
 
 }  // namespace varve::tests

@@ -4,13 +4,21 @@
 #include <cfenv>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <stdexcept>
+#include <string>
 #include <thread>
+#include <vector>
 
 #include <gtest/gtest.h>
 #if defined(__x86_64__)
 #include <xmmintrin.h>
 #endif
+
+#include "core/arithmetic.h"
+#include "core/parameters.h"
+#include "core/simulation.h"
+#include "core/workers.h"
 
 namespace varve::tests {
 
@@ -19,6 +27,9 @@ double fma_target_residue();
 float fma_target_residue_float();
 
 namespace {
+
+using core::keeps_subnormals;
+using core::rounds_to_nearest;
 
 bool has_fma() {
 #if defined(__x86_64__)
@@ -57,26 +68,81 @@ TEST(FloatingPoint, EveryThreadRoundsToNearestAndKeepsSubnormals) {
   EXPECT_TRUE(subnormals);
 }
 
-TEST(FloatingPoint, AnotherRoundingModeIsSeen) {
-  const int before = std::fegetround();
+/// Runs `body` in a floating-point mode of its own and puts the old one back.
+template <class Set, class Body>
+void in_mode(const Set& set, const Body& body) {
+  std::fenv_t before;
+  std::fegetenv(&before);
+  set();
+  body();
+  std::fesetenv(&before);
+}
+
+/// What goes wrong in `mode`, or "" if nothing does. No assertion runs inside: printing would.
+template <class Set, class Body>
+std::string complaint(const Set& set, const Body& body) {
+  std::string text;
+  in_mode(set, [&] {
+    try {
+      body();
+    } catch (const core::ArithmeticError& error) {
+      text = error.what();
+    }
+  });
+  return text;
+}
+
+core::Scenario tank() {
+  core::Scenario scenario;
+  scenario.domain.width = scenario.domain.height = 0.01;
+  scenario.fluid.spacing = 1e-3;
+  scenario.fluid.sound_speed = 2.5;
+  scenario.time.steps = 10;
+  EXPECT_TRUE(core::resolve(scenario).empty());
+  return scenario;
+}
+
+TEST(FloatingPoint, AnotherRoundingModeIsSeenAndRefused) {
+  const core::Scenario scenario = tank();
   for (const int mode : {FE_UPWARD, FE_DOWNWARD, FE_TOWARDZERO}) {
-    ASSERT_EQ(std::fesetround(mode), 0);
-    const bool nearest = rounds_to_nearest();
-    std::fesetround(before);
+    bool nearest = true;
+    const auto set = [&] { std::fesetround(mode); };
+    in_mode(set, [&] { nearest = rounds_to_nearest(); });
     EXPECT_FALSE(nearest) << "mode " << mode;
+    EXPECT_NE(complaint(set, [&] { core::Simulation::create(scenario, {}); }).find("to nearest"),
+              std::string::npos);
   }
+  EXPECT_TRUE(rounds_to_nearest());
 }
 
 #if defined(__x86_64__)
-TEST(FloatingPoint, FlushingToZeroIsSeen) {
-  const unsigned before = _mm_getcsr();
+TEST(FloatingPoint, FlushingToZeroIsSeenAndRefused) {
+  const core::Scenario scenario = tank();
+  const auto healthy = core::Simulation::create(scenario, {});
+  std::vector<core::FieldSpan> state;
+  for (std::size_t f = 0; f < healthy->fields().size(); ++f) state.push_back(healthy->field(f));
   for (const unsigned bit : {0x8000U, 0x0040U}) {  // results flushed, operands flushed
-    _mm_setcsr(before | bit);
-    const bool subnormals = keeps_subnormals();
-    _mm_setcsr(before);
+    bool subnormals = true;
+    const auto set = [&] { _mm_setcsr(_mm_getcsr() | bit); };
+    in_mode(set, [&] { subnormals = keeps_subnormals(); });
     EXPECT_FALSE(subnormals) << "MXCSR bit " << bit;
+    for (const std::string& text :
+         {complaint(set, [&] { core::Simulation::create(scenario, {}); }),
+          complaint(set, [&] { core::Simulation::restore(scenario, state, {}); })})
+      EXPECT_NE(text.find("flushed to zero"), std::string::npos) << "MXCSR bit " << bit;
   }
   EXPECT_TRUE(keeps_subnormals());
+}
+
+// Threads take over the mode of the thread that starts them, and keep it.
+TEST(FloatingPoint, OneThreadInAnotherModeIsFound) {
+  std::unique_ptr<core::Workers> workers;
+  in_mode([] { _mm_setcsr(_mm_getcsr() | 0x8040U); },
+          [&] { workers = std::make_unique<core::Workers>(3); });
+  EXPECT_NO_THROW(core::require_exact_arithmetic());
+  EXPECT_THROW(core::require_exact_arithmetic(*workers), core::ArithmeticError);
+  core::Workers healthy(3);
+  EXPECT_NO_THROW(core::require_exact_arithmetic(healthy));
 }
 #endif
 
