@@ -253,10 +253,13 @@ void compare(const Scene& scene, const Trace& reference, const Variant& first, c
 
 void check_threads_worked(const Scene& scene, const Trace& trace, const Variant& variant) {
   if (!scene.scenario.has_fluid()) return;  // a few grains are one thread's work
+  // The scenes are too small to be divided among more.
+  const std::size_t busy_least = std::min<std::size_t>(variant.threads, 8);
   const auto& items = trace.items_per_thread;
-  const bool all = items.size() == variant.threads &&
-                   std::all_of(items.begin(), items.end(), [](auto count) { return count > 0; });
-  if (!all) fail(scene.name + ": not every one of " + describe(variant) + " did work");
+  const auto busy = static_cast<std::size_t>(
+      std::count_if(items.begin(), items.end(), [](auto count) { return count > 0; }));
+  if (items.size() != variant.threads || busy < busy_least)
+    fail(scene.name + ": of " + describe(variant) + " only " + std::to_string(busy) + " did work");
 }
 
 // ---- command line ------------------------------------------------------------------------------
