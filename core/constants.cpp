@@ -57,6 +57,10 @@ Constants<D> constants_of(const Scenario& s) {
     c.sound_speed = s.fluid.sound_speed;
     c.viscosity = s.fluid.viscosity;
     c.diffusion = s.fluid.density_diffusion;
+    if (s.fluid.equation_of_state == EquationOfState::tait)
+      c.tait_pressure = s.fluid.density * (s.fluid.sound_speed * s.fluid.sound_speed) / 7;
+    c.artificial_alpha = s.fluid.artificial_alpha;
+    c.artificial_beta = s.fluid.artificial_beta;
     if (c.full_pressure) c.fluid_acceleration = c.gravity;
     c.fluid_acceleration[0] += s.fluid.body_force_x;
     c.fluid_acceleration[1] += s.fluid.body_force_y;
@@ -68,6 +72,8 @@ Constants<D> constants_of(const Scenario& s) {
     c.porosity_floor = s.coupling.porosity_floor;
     c.exclude_own_volume = s.coupling.exclude_own_volume;
     c.conservative_porosity = s.coupling.porosity == Porosity::conservative;
+    c.conjugate_pressure =
+        c.two_way && s.coupling.pressure_force == PressureForce::conjugate;
   }
   return c;
 }

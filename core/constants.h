@@ -18,6 +18,8 @@ struct Constants {
   double sound_speed = 0;        // [m/s] c0
   double viscosity = 0;          // [Pa s] mu
   double diffusion = 0;          // [-] delta
+  double tait_pressure = 0;      // [Pa] B; 0: linear equation of state
+  double artificial_alpha = 0, artificial_beta = 0;  // [-] of Monaghan's viscosity
   double spacing = 0;            // [m] dx
   bool full_pressure = false;
   Vec<double, D> gravity = Vec<double, D>::Zero();           // [m/s2]
@@ -39,6 +41,7 @@ struct Constants {
   double porosity_floor = 0;
   bool exclude_own_volume = true;
   bool conservative_porosity = false;
+  bool conjugate_pressure = false;
 
   double dt = 0;
   Periodicity<D> period;

@@ -11,18 +11,31 @@ namespace {
 template <int D>
 using CouplingKernel = SmoothingKernel<D, Kernel::wendland_c2, double>;
 
-/// Distance over the nearest periodic image.
+/// a - b over the nearest periodic image.
 template <int D, class T>
-double separation(const Constants<D>& c, const Vec<T, D>& a, const Vec<T, D>& b) {
-  double r2 = 0;
+Vec<double, D> difference(const Constants<D>& c, const Vec<T, D>& a, const Vec<T, D>& b) {
+  Vec<double, D> difference;
   for (int k = 0; k < D; ++k) {
     double d = static_cast<double>(a[k]) - static_cast<double>(b[k]);
     const double length = c.period.length[k];
     if (d > 0.5 * length) d -= length;
     if (d < -0.5 * length) d += length;
-    r2 += d * d;
+    difference[k] = d;
   }
+  return difference;
+}
+
+template <int D>
+double length_of(const Vec<double, D>& v) {
+  double r2 = 0;
+  for (int k = 0; k < D; ++k) r2 += v[k] * v[k];
   return std::sqrt(r2);
+}
+
+/// Distance over the nearest periodic image.
+template <int D, class T>
+double separation(const Constants<D>& c, const Vec<T, D>& a, const Vec<T, D>& b) {
+  return length_of<D>(difference<D>(c, a, b));
 }
 
 }  // namespace
@@ -51,6 +64,15 @@ void CouplingStage<D, P>::rebuild(const Constants<D>& c, const State<D, P>& stat
   cells.build(grains, radius, c.period);
   grains_of_ = candidates<D, Position>(grains, cells, radius, c.period, true, workers);
   weights_.assign(fluid_of_.index.size(), 0);
+  pushes_.clear();
+  pressure_force_.clear();
+  image_force_.clear();
+  if (c.conjugate_pressure) {
+    pushes_.assign(fluid_of_.index.size(), Vec<double, D>::Zero());
+    pressure_force_.assign(grains.size(), Vec<double, D>::Zero());
+    image_force_ = pressure_force_;
+    mean_pressure_.assign(grains.size(), 0);
+  }
   near_start_.assign(fluid.size() + 1, 0);
   for (const std::int32_t a : fluid_of_.index) ++near_start_[static_cast<std::size_t>(a) + 1];
   for (std::size_t a = 0; a < fluid.size(); ++a) near_start_[a + 1] += near_start_[a];
@@ -91,21 +113,25 @@ typename CouplingStage<D, P>::Images CouplingStage<D, P>::images(const Constants
   for (int k = 0; k < D; ++k) total *= counts[k];
   for (int n = 1; n < total; ++n) {  // 0 is the point itself
     int rest = n;
+    Vec<double, D>& sign = result.sign[static_cast<std::size_t>(result.count)];
     Vec<double, D>& image = result.at[static_cast<std::size_t>(result.count++)];
     for (int k = 0; k < D; ++k) {
       image[k] = places[k][rest % counts[k]];
+      sign[k] = rest % counts[k] == 0 ? 1 : -1;
       rest /= counts[k];
     }
   }
   if (!pipe) return result;
   // As in a plane that touches the curved wall where it is nearest, the images found so far too.
-  const Vec<double, D> across =
-      -2 * distance_inside<D>(*pipe, x) * inward_normal<D>(*pipe, x);
+  result.normal = inward_normal<D>(*pipe, x);
+  const Vec<double, D> across = -2 * distance_inside<D>(*pipe, x) * result.normal;
   const int flat = result.count;
-  result.at[static_cast<std::size_t>(result.count++)] = x + across;
-  for (int n = 0; n < flat; ++n)
-    result.at[static_cast<std::size_t>(result.count++)] =
-        result.at[static_cast<std::size_t>(n)] + across;
+  for (int n = -1; n < flat; ++n) {
+    const auto into = static_cast<std::size_t>(result.count++), from = static_cast<std::size_t>(n);
+    result.at[into] = (n < 0 ? x : result.at[from]) + across;
+    result.sign[into] = n < 0 ? Vec<double, D>(Vec<double, D>::Ones()) : result.sign[from];
+    result.curved[into] = true;
+  }
   return result;
 }
 
@@ -182,6 +208,79 @@ double CouplingStage<D, P>::others_porosity(const Constants<D>& c, const State<D
 }
 
 template <int D, class P>
+void CouplingStage<D, P>::share_pressure(const Constants<D>& c, std::span<const Real> volume,
+                                         std::span<const Real> pressure,
+                                         std::span<const Real> porosity,
+                                         std::span<const Real> floored, std::span<Real> push,
+                                         Workers& workers) {
+  workers.run(forces_.size(), 1, [&](std::size_t begin, std::size_t end, unsigned) {
+    for (std::size_t i = begin; i < end; ++i) {
+      mean_pressure_[i] = 0;
+      double sum = 0, weights = 0;
+      for (std::uint32_t slot = fluid_of_.start[i]; slot < fluid_of_.start[i + 1]; ++slot) {
+        const auto a = static_cast<std::size_t>(fluid_of_.index[slot]);
+        const double weight = static_cast<double>(volume[a]) * weights_[slot];
+        weights += weight;
+        if (static_cast<double>(porosity[a]) >= c.porosity_floor)
+          sum += weight * static_cast<double>(pressure[a]);
+      }
+      if (weights > 0) mean_pressure_[i] = sum / weights;
+    }
+  });
+  workers.run(push.size(), 64, [&](std::size_t begin, std::size_t end, unsigned) {
+    for (std::size_t a = begin; a < end; ++a) {
+      double q = static_cast<double>(floored[a]) * static_cast<double>(pressure[a]);
+      for (std::uint32_t k = near_start_[a]; k < near_start_[a + 1]; ++k)
+        q += spread_volume_[near_[k].grain] * weights_[near_[k].slot] *
+             mean_pressure_[near_[k].grain];
+      push[a] = static_cast<Real>(q);
+    }
+  });
+}
+
+/// The conjugate pressure forces between grain i and the fluid around it.
+template <int D, class P>
+void CouplingStage<D, P>::push_apart(const Constants<D>& c, const State<D, P>& state,
+                                     const FluidView<D, P>& fluid, std::size_t i) {
+  const CouplingKernel<D> kernel(c.coupling_length);
+  const Vec<double, D> x = state.grains.position[i].template cast<double>();
+  const Images mirrored = images(c, x);
+  Vec<double, D> on_grain = Vec<double, D>::Zero(), by_walls = Vec<double, D>::Zero();
+  for (std::uint32_t slot = fluid_of_.start[i]; slot < fluid_of_.start[i + 1]; ++slot) {
+    const auto a = static_cast<std::size_t>(fluid_of_.index[slot]);
+    pushes_[slot].setZero();
+    if (weights_[slot] <= 0) continue;
+    const bool floored = static_cast<double>(fluid.porosity[a]) < c.porosity_floor;
+    const double pressure = floored ? 0.0 : static_cast<double>(fluid.pressure[a]);
+    const double push = (pressure - mean_pressure_[i]) * spread_volume_[i];
+    const double volume = static_cast<double>(fluid.volume[a]);
+    const Vec<double, D> xa = fluid.position[a].template cast<double>();
+    const Vec<double, D> d = difference<D>(c, xa, x);
+    Vec<double, D> on_fluid = -push * kernel.slope(length_of<D>(d)) * d;
+    on_grain -= volume * on_fluid;
+    for (int n = 0; n < mirrored.count; ++n) {
+      const auto k = static_cast<std::size_t>(n);
+      const Vec<double, D> e = difference<D>(c, xa, mirrored.at[k]);
+      const Vec<double, D> force = -push * kernel.slope(length_of<D>(e)) * e;
+      const Vec<double, D> back = mirrored.turned_back(k, force);
+      on_fluid += force;
+      on_grain -= volume * back;
+      by_walls += volume * (force - back);
+    }
+    pushes_[slot] = on_fluid;
+  }
+  pressure_force_[i] = on_grain;
+  image_force_[i] = by_walls;
+}
+
+template <int D, class P>
+Vec<double, D> CouplingStage<D, P>::walls_on_fluid() const {
+  Vec<double, D> sum = Vec<double, D>::Zero();
+  for (const Vec<double, D>& each : image_force_) sum += each;
+  return sum;
+}
+
+template <int D, class P>
 GrainForce<D> CouplingStage<D, P>::force_on(const Constants<D>& c, const State<D, P>& state,
                                        const FluidView<D, P>& fluid, const DragLaw<D>& law,
                                        std::size_t i) const {
@@ -200,6 +299,10 @@ GrainForce<D> CouplingStage<D, P>::force_on(const Constants<D>& c, const State<D
   if (f.weight <= 0) return f;
   f.fluid_velocity = velocity / f.weight;
   f.hydrodynamic = c.grain_volume * stress / f.weight;
+  if (c.conjugate_pressure) {
+    f.pressure = pressure_force_[i];
+    f.hydrodynamic += f.pressure;
+  }
   const Vec<double, D> v = state.grains.velocity[i].template cast<double>();
   const Vec<double, D> slip = f.fluid_velocity - v;
   double speed2 = 0;
@@ -215,7 +318,10 @@ void CouplingStage<D, P>::forces(const Constants<D>& c, const State<D, P>& state
                             Workers& workers) {
   if (!c.two_way) compute_weights(c, state, fluid.position, workers);
   workers.run(state.grains.size(), 1, [&](std::size_t begin, std::size_t end, unsigned) {
-    for (std::size_t i = begin; i < end; ++i) forces_[i] = force_on(c, state, fluid, law, i);
+    for (std::size_t i = begin; i < end; ++i) {
+      if (c.conjugate_pressure) push_apart(c, state, fluid, i);
+      forces_[i] = force_on(c, state, fluid, law, i);
+    }
   });
   grain_clamps_ = weak_ = 0;
   for (const GrainForce<D>& f : forces_) {
@@ -230,7 +336,8 @@ void CouplingStage<D, P>::set_drag(std::span<const Vec<double, D>> mean_drag) {
     GrainForce<D>& f = forces_[i];
     f.drag = mean_drag[i];
     reaction_per_weight_[i] = f.weight > 0
-                                  ? Vec<double, D>(-(f.hydrodynamic + f.drag) / f.weight)
+                                  ? Vec<double, D>(-(f.hydrodynamic - f.pressure + f.drag) /
+                                                   f.weight)
                                   : Vec<double, D>(Vec<double, D>::Zero());
   }
 }

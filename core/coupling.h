@@ -17,19 +17,36 @@
 
 namespace varve::core {
 
-/// Fluid quantities that the coupling reads (all of one size).
+/// Fluid quantities that the coupling reads (all of one size). What grains feel of the fluid's
+/// stresses has two forms (coupling.pressure_force):
+///   averaged   V times the mean of (-grad p + div tau) around the grain: `stress_force` is both;
+///   conjugate  the pressure part from the work that moving the grain does on the fluid's density,
+///              rho = rhob / eps: `stress_force` is the viscous part alone.
+///
+/// The conjugate forces are minus the derivatives of the fluid's internal energy, dU = sum_a V_a
+/// p_a (eps_a drhob_a / rhob_a - deps_a), by the places of fluid and grains, with continuity for
+/// drhob and E3' for deps: what the grains' motion does to the density comes back as work. (Sun,
+/// Sakai and Yamada 2013 derive a coupling from an energy too.) With S_j = sum_b V_b w_bj and
+/// p_j = sum_a V_a p_a w_aj / S_j:
+///   pairs of fluid  -V_a V_b (q_a + q_b) grad W_ab, q_a = eps_a p_a + sum_j V_j w_aj p_j / S_j
+///   grain on fluid  -V_a (p_a - p_j) (V_j / S_j) grad w_aj, the opposite on the grain
+/// An even pressure exerts nothing on a grain and what it would without grains on the fluid. E3
+/// takes the S_j written out here to be 1, which an even fluid has. Where eps_a is floored it does
+/// not change with the grains: p_a counts as 0 in p_j and in the second line.
 template <int D, class P>
 struct FluidView {
   std::span<const Vec<typename P::Position, D>> position;
   std::span<const Vec<typename P::Real, D>> velocity;
   std::span<const typename P::Real> volume;        // [m3] m / rhob
   std::span<const Vec<typename P::Real, D>> stress_force;  // [N] on each fluid particle
+  std::span<const typename P::Real> pressure, porosity;  // [Pa], unfloored; conjugate form only
 };
 
 /// What the fluid does to one grain during a step.
 template <int D>
 struct GrainForce {
   Vec<double, D> hydrodynamic = Vec<double, D>::Zero();  // [N] V (-grad p + div tau)
+  Vec<double, D> pressure = Vec<double, D>::Zero();  // [N] of that, -V grad p; conjugate form
   Vec<double, D> drag = Vec<double, D>::Zero();          // [N] mean of K (u - v) over the sub-steps
   Vec<double, D> fluid_velocity = Vec<double, D>::Zero();  // [m/s] u at the grain
   double porosity = 1;     // [-] felt by the grain, floored
@@ -58,23 +75,35 @@ class CouplingStage {
                 std::span<const Real> volume_before, std::span<Real> porosity,
                 std::span<Real> floored, Workers& workers);
 
+  /// What pairs of fluid particles push each other with in the conjugate form [Pa], written to
+  /// `push`; also finds the p_j.
+  void share_pressure(const Constants<D>& c, std::span<const Real> volume,
+                      std::span<const Real> pressure, std::span<const Real> porosity,
+                      std::span<const Real> floored, std::span<Real> push, Workers& workers);
+
   /// E11, E12: hydrodynamic forces on all grains and their drag coefficients, at the slip that the
-  /// step starts with. One-way coupling has its weights computed here.
+  /// step starts with. One-way coupling has its weights computed here. In the conjugate form the
+  /// pressure part is, pair by pair, F = +-V_a (p_a - p_j) (V_j / S_j) grad w_aj.
   void forces(const Constants<D>& c, const State<D, P>& state, const FluidView<D, P>& fluid,
               const DragLaw<D>& law, Workers& workers);
 
   /// Takes over the drag that the grains really felt, from their motion.
   void set_drag(std::span<const Vec<double, D>> mean_drag);
 
-  /// E13: reaction on fluid particle `a` [N]: -sum_i (F_hyd + F_drag)_i V_a w_ai / S_i.
+  /// E13: reaction on fluid particle `a` [N]: -sum_i (F_hyd + F_drag)_i V_a w_ai / S_i, and in the
+  /// conjugate form what grains push this very particle with.
   Vec<double, D> reaction(std::size_t a, double volume) const {
     Vec<double, D> sum = Vec<double, D>::Zero();
     for (std::uint32_t k = near_start_[a]; k < near_start_[a + 1]; ++k) {
       const Near& near = near_[k];
       sum += weights_[near.slot] * reaction_per_weight_[near.grain];
+      if (!pushes_.empty()) sum += pushes_[near.slot];
     }
     return volume * sum;
   }
+  /// Force [N] of walls on the fluid through the mirror images of grains: what of the conjugate
+  /// forces on fluid is not matched by one on a grain.
+  Vec<double, D> walls_on_fluid() const;
 
   const std::vector<GrainForce<D>>& grain_forces() const { return forces_; }
   std::uint64_t fluid_clamps() const { return fluid_clamps_; }
@@ -89,12 +118,27 @@ class CouplingStage {
   /// a curved wall is taken as the plane that touches it where it is nearest.
   struct Images {
     std::array<Vec<double, D>, 26> at;
+    std::array<Vec<double, D>, 26> sign;  // -1 along axes that were mirrored, else 1
+    std::array<bool, 26> curved{};        // mirrored also along `normal`, in a curved wall
+    Vec<double, D> normal = Vec<double, D>::Zero();
     int count = 0;
+
+    /// A vector at image n as its original has it.
+    Vec<double, D> turned_back(std::size_t n, Vec<double, D> v) const {
+      if (curved[n]) {
+        double along = 0;
+        for (int k = 0; k < D; ++k) along += v[k] * normal[k];
+        v -= 2 * along * normal;
+      }
+      return sign[n].cwiseProduct(v);
+    }
   };
   Images images(const Constants<D>& c, const Vec<double, D>& x) const;
   void compute_weights(const Constants<D>& c, const State<D, P>& state,
                        std::span<const Vec<Position, D>> fluid, Workers& workers);
   double others_porosity(const Constants<D>& c, const State<D, P>& state, std::size_t i) const;
+  void push_apart(const Constants<D>& c, const State<D, P>& state, const FluidView<D, P>& fluid,
+                  std::size_t i);
   GrainForce<D> force_on(const Constants<D>& c, const State<D, P>& state,
                          const FluidView<D, P>& fluid, const DragLaw<D>& law, std::size_t i) const;
 
@@ -106,8 +150,11 @@ class CouplingStage {
   std::vector<std::uint32_t> near_start_;  // per fluid particle
   std::vector<Near> near_;
   std::vector<double> spread_volume_;  // V_j, or V_j / sum_b V_b w_bj
+  std::vector<double> mean_pressure_;  // [Pa] p_j of the conjugate form
   std::vector<GrainForce<D>> forces_;
   std::vector<Vec<double, D>> reaction_per_weight_;
+  std::vector<Vec<double, D>> pushes_;  // [N/m3] per slot: -p_a V_j grad w_aj; empty if averaged
+  std::vector<Vec<double, D>> pressure_force_, image_force_;  // [N] per grain; the same
   std::uint64_t fluid_clamps_ = 0, grain_clamps_ = 0, weak_ = 0;  // of the last step
 };
 

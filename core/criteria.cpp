@@ -193,7 +193,13 @@ std::vector<StepLimit> step_limits(const Scenario& s) {
       const double falling = 0.25 * std::sqrt(h / g);
       limits.push_back({"acceleration", "0.25 sqrt(h / g)", falling, falling});
     }
-    const double viscous = 0.125 * h * h * s.fluid.density / s.fluid.viscosity;
+    double viscous = 0.125 * h * h * s.fluid.density / s.fluid.viscosity;
+    if (s.fluid.artificial_alpha > 0) {
+      // Monaghan's linear term acts like a kinematic viscosity alpha c0 h / (2 (D + 2)).
+      const double added = s.fluid.artificial_alpha * s.fluid.sound_speed * h /
+                           (2 * (static_cast<double>(s.domain.dimension) + 2));
+      viscous = 0.125 * h * h / (s.fluid.viscosity / s.fluid.density + added);
+    }
     limits.push_back({"viscosity", "0.125 h^2 rho0 / mu", viscous, viscous});
   }
   if (grains_move(s)) {

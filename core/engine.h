@@ -58,10 +58,11 @@ class Engine final : public Simulation {
   /// particle, dummy arrays one more than there are dummies: a padding point that weighs nothing.
   struct Work {
     std::vector<Real> porosity, floored_porosity, volume_before, density_before, volume, pressure;
-    std::vector<Vec<Real, D>> stress_force;
+    std::vector<Real> push;
+    std::vector<Vec<Real, D>> stress_force, viscous_force;
     std::vector<Vec<Position, D>> wall_position;
     std::vector<Vec<Real, D>> wall_own_velocity, wall_velocity;
-    std::vector<Real> wall_volume, wall_viscous_volume, wall_pressure;
+    std::vector<Real> wall_volume, wall_viscous_volume, wall_push;
     std::size_t wall_count = 0;
     std::vector<OuterForce<D>> outer;  // per grain
   };
@@ -82,6 +83,7 @@ class Engine final : public Simulation {
   void find_density_and_pressure();
   void find_wall_values();
   void find_stresses();
+  void add_artificial_viscosity();
   void find_grain_forces();
   void move_grains();
   void hold_grains();
@@ -98,6 +100,7 @@ class Engine final : public Simulation {
   bool fluid_is_good(std::size_t a) const;
   [[noreturn]] void report_fluid(std::size_t a) const;
   void wrap(Vec<Position, D>& x) const;
+  Vec<double, D> wall_repulsion(const Vec<Position, D>& x) const;
   double density_deviation(std::size_t a) const;
   double beyond_walls(const Vec<Position, D>& x) const;
   static void describe(const GeometryReport& report, std::vector<Happening>& happenings);

@@ -32,11 +32,14 @@ void Engine<D, P>::adopt_scenario() {
   walls_ = domain_walls(scenario_);
   if (scenario_.has_fluid()) {
     build_walls();
-    sweeps_ = pair_sweeps<D, P>(scenario_.fluid.kernel, c_.period.any(), instruction_set_);
+    sweeps_ = pair_sweeps<D, P>(scenario_.fluid.kernel, c_.period.any(), c_.conjugate_pressure,
+                                instruction_set_);
     const std::size_t n = state_.fluid.size();
-    for (auto* each : {&work_.volume_before, &work_.density_before, &work_.volume, &work_.pressure})
+    for (auto* each : {&work_.volume_before, &work_.density_before, &work_.volume, &work_.pressure,
+                       &work_.push})
       each->assign(n, 0);
     work_.stress_force.assign(n, Vec<Real, D>::Zero());
+    work_.viscous_force.assign(c_.conjugate_pressure ? n : 0, Vec<Real, D>::Zero());
     const std::size_t porous = c_.two_way ? n : 0;
     work_.porosity.assign(porous, 1);
     work_.floored_porosity.assign(porous, 1);
@@ -61,7 +64,7 @@ void Engine<D, P>::build_walls() {
   work_.wall_velocity.assign(n + 1, Vec<Real, D>::Zero());
   work_.wall_volume.assign(n + 1, 0);
   work_.wall_viscous_volume.assign(n + 1, 0);
-  work_.wall_pressure.assign(n + 1, 0);
+  work_.wall_push.assign(n + 1, 0);
   for (std::size_t w = 0; w < n; ++w) {
     work_.wall_position[w] = dummies[w].position.template cast<Position>();
     work_.wall_own_velocity[w][0] = static_cast<Real>(dummies[w].speed_x);

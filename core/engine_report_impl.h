@@ -91,8 +91,8 @@ Vec<double, D> Engine<D, P>::walls_on_fluid() const {
                              static_cast<double>(work_.wall_volume[w]);
       const double viscous = static_cast<double>(work_.volume[a]) *
                              static_cast<double>(work_.wall_viscous_volume[w]);
-      const double pressures = static_cast<double>(work_.pressure[a]) +
-                               static_cast<double>(work_.wall_pressure[w]);
+      const double pressures = static_cast<double>(work_.push[a]) +
+                               static_cast<double>(work_.wall_push[w]);
       for (int k = 0; k < D; ++k) {
         const double dv = static_cast<double>(next_.fluid.velocity[a][k]) -
                           static_cast<double>(work_.wall_velocity[w][k]);
@@ -100,6 +100,9 @@ Vec<double, D> Engine<D, P>::walls_on_fluid() const {
                     2 * c_.viscosity * viscous * slope * (r2 / (r2 + soft)) * dv;
       }
     }
+  if (c_.conjugate_pressure) total += coupling_.walls_on_fluid();
+  for (std::size_t a = 0; a < state_.fluid.size(); ++a)
+    total += static_cast<double>(state_.fluid.mass[a]) * wall_repulsion(next_.fluid.position[a]);
   return total;
 }
 
@@ -135,6 +138,8 @@ StepLedger Engine<D, P>::ledger() const {
     grain_external += c_.frozen ? V(-acting) : c_.grain_weight;
     scale += acting.norm() + c_.grain_weight.norm();
   }
+  // Part of the reactions near a wall is the wall's: it mirrors the grains.
+  if (c_.conjugate_pressure) reactions -= coupling_.walls_on_fluid();
   V on_grains = V::Zero();
   if (scenario_.has_grains() && !c_.frozen) on_grains = contacts_.wall_impulse() / c_.dt;
   using engine_detail::listed;

@@ -65,7 +65,7 @@ void Engine<D, P>::digest_stage(Stage stage) {
       s.values(scalars(work_.pressure));
       break;
     case Stage::walls:
-      s.values(scalars(work_.wall_pressure).first(dummies));
+      s.values(scalars(work_.wall_push).first(dummies));
       s.values(scalars(work_.wall_velocity).first(dummies * D));
       break;
     case Stage::stress:

@@ -13,11 +13,12 @@ namespace engine_detail {
 
 /// Names of the stages as Counters reports them; a stage that a scene does not need never runs.
 enum Pass : std::size_t {
-  pass_lists, pass_porosity, pass_density, pass_walls, pass_stress, pass_grain_forces,
+  pass_lists, pass_porosity, pass_density, pass_walls, pass_stress, pass_artificial,
+  pass_grain_forces,
   pass_contacts, pass_fluid, pass_reaction, pass_count
 };
 inline constexpr const char* pass_names[pass_count] = {
-    "lists", "porosity", "density", "walls", "stress", "grain_forces",
+    "lists", "porosity", "density", "walls", "stress", "artificial_viscosity", "grain_forces",
     "contacts", "fluid", "reaction"};
 
 /// The skin of the lists over the smoothing length: small enough for short lists, large enough that
@@ -130,15 +131,21 @@ SweepData<D, P> Engine<D, P>::sweep_data() {
   s.superficial_density_next = next_.fluid.superficial_density.data();
   s.volume = work_.volume.data();
   s.pressure = work_.pressure.data();
-  s.wall_pressure = work_.wall_pressure.data();
+  s.push = work_.push.data();
+  s.wall_push = work_.wall_push.data();
   s.wall_velocity = reinterpret_cast<Real*>(work_.wall_velocity.data());
   s.stress_force = reinterpret_cast<Real*>(work_.stress_force.data());
+  s.viscous_force = reinterpret_cast<Real*>(work_.viscous_force.data());
+  s.conjugate = c_.conjugate_pressure;
   s.smoothing_length = static_cast<Real>(c_.smoothing_length);
   s.dt = static_cast<Real>(c_.dt);
   s.reference_density = static_cast<Real>(c_.reference_density);
   s.sound_speed = static_cast<Real>(c_.sound_speed);
   s.viscosity = static_cast<Real>(c_.viscosity);
   s.diffusion = static_cast<Real>(c_.diffusion);
+  s.tait_pressure = static_cast<Real>(c_.tait_pressure);
+  s.artificial_alpha = static_cast<Real>(c_.artificial_alpha);
+  s.artificial_beta = static_cast<Real>(c_.artificial_beta);
   for (int k = 0; k < D; ++k) {
     s.gravity[k] = static_cast<Real>(c_.fluid_acceleration[k]);
     // Fluid at rest in the full form has grad rho = rho0 g / c0^2; diffusion acts on what is left.
@@ -158,6 +165,9 @@ void Engine<D, P>::find_density_and_pressure() {
                [&](std::size_t begin, std::size_t end, unsigned) {
                  sweeps_.density(data, begin, end);
                });
+  if (c_.conjugate_pressure)
+    coupling_.share_pressure(c_, work_.volume, work_.pressure, work_.porosity,
+                             work_.floored_porosity, work_.push, workers_);
   digest_stage(Stage::pressure);
   count_pass(engine_detail::pass_density);
 }
@@ -180,14 +190,26 @@ void Engine<D, P>::find_stresses() {
                [&](std::size_t begin, std::size_t end, unsigned) {
                  sweeps_.stress(data, begin, end);
                });
-  digest_stage(Stage::stress);
   count_pass(engine_detail::pass_stress);
+  if (c_.artificial_alpha > 0 || c_.artificial_beta > 0) add_artificial_viscosity();
+  digest_stage(Stage::stress);
+}
+
+template <int D, class P>
+void Engine<D, P>::add_artificial_viscosity() {
+  const SweepData<D, P> data = sweep_data();
+  workers_.run((data.count + lanes - 1) / lanes, 4,
+               [&](std::size_t begin, std::size_t end, unsigned) {
+                 sweeps_.artificial(data, begin, end);
+               });
+  count_pass(engine_detail::pass_artificial);
 }
 
 template <int D, class P>
 void Engine<D, P>::find_grain_forces() {
   const FluidView<D, P> fluid{state_.fluid.position, state_.fluid.velocity, work_.volume,
-                              work_.stress_force};
+                              c_.conjugate_pressure ? work_.viscous_force : work_.stress_force,
+                              work_.pressure, work_.porosity};
   coupling_.forces(c_, state_, fluid, drag_law_, workers_);
   counters_.drag_porosity_clamps += coupling_.grain_clamps();
   counters_.weak_coupling += coupling_.weak_grains();
@@ -298,7 +320,9 @@ std::size_t Engine<D, P>::move_fluid_part(std::size_t begin, std::size_t end) {
     Vec<Real, D> force = work_.stress_force[a];
     if (c_.two_way)
       force += coupling_.reaction(a, static_cast<double>(work_.volume[a])).template cast<Real>();
-    const Vec<Real, D> acceleration = force / state_.fluid.mass[a] + outside;
+    const Vec<double, D> repulsion = wall_repulsion(state_.fluid.position[a]);
+    const Vec<Real, D> acceleration =
+        force / state_.fluid.mass[a] + outside + repulsion.template cast<Real>();
     Vec<Real, D>& v = next_.fluid.velocity[a];
     Vec<Position, D>& x = next_.fluid.position[a];
     v = state_.fluid.velocity[a] + dt * acceleration;
@@ -307,6 +331,24 @@ std::size_t Engine<D, P>::move_fluid_part(std::size_t begin, std::size_t end) {
     if (first_bad == engine_detail::nobody && !fluid_is_good(a)) first_bad = a;
   }
   return first_bad;
+}
+
+/// Acceleration [m/s2] of fluid nearer than dx/4 to a wall, or beyond it: c0^2/(10 dx) at the wall,
+/// linear. Dummies alone hold fluid back by its pressure, and where that is not above the mean,
+/// between a grain and a wall, particles creep through: diffusion evens out the density that would
+/// stop them. At the wall this stops 0.16 c0, at the guard's dx beyond it 0.79 c0.
+template <int D, class P>
+Vec<double, D> Engine<D, P>::wall_repulsion(const Vec<Position, D>& x) const {
+  Vec<double, D> sum = Vec<double, D>::Zero();
+  const double reach = 0.25 * c_.spacing;
+  const Vec<double, D> place = x.template cast<double>();
+  for (const Wall& wall : walls_) {
+    const double inside = distance_inside<D>(wall, place);
+    if (inside >= reach) continue;
+    sum += (1 - inside / reach) * c_.sound_speed * c_.sound_speed / (10 * c_.spacing) *
+           inward_normal<D>(wall, place);
+  }
+  return sum;
 }
 
 template <int D, class P>

@@ -1,5 +1,6 @@
 #include "core/initial.h"
 
+#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -168,8 +169,13 @@ double hydrostatic_excess_density(const Scenario& scenario, const Vec<double, D>
   if (d.bottom != Boundary::periodic) work += down * (surface - x[1]);
   if (is_wall(d.sides))
     work += right * (x[0] - (right >= 0 ? d.left : d.left + d.width));
-  return scenario.fluid.density * work /
-         (scenario.fluid.sound_speed * scenario.fluid.sound_speed);
+  const double compression =
+      work / (scenario.fluid.sound_speed * scenario.fluid.sound_speed);
+  if (scenario.fluid.equation_of_state == EquationOfState::linear)
+    return scenario.fluid.density * compression;
+  // Tait's equation solved for the density. Above a surface nothing carries any tension.
+  const double ratio = std::max(0.0, 1 + 7 * compression);
+  return scenario.fluid.density * (pow(ratio, 1.0 / 7) - 1);
 }
 
 template <int D, class To, class From>

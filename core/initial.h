@@ -35,7 +35,7 @@ template <int D = 2>
 std::vector<double> floored_porosity(const Scenario& scenario,
                                      const State<D, DoublePrecision>& state);
 
-/// [kg/m3] Density above rho0 that carries the fluid at rest under gravity, linear equation of
+/// [kg/m3] Density above rho0 that carries the fluid at rest under gravity, by the equation of
 /// state, 0 at `surface` [m] height. With walls on both sides and a tilt, 0 at the upper of the two
 /// corners.
 template <int D = 2>

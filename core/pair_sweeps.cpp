@@ -5,7 +5,7 @@ namespace varve::core {
 #define VARVE_DECLARE(isa)        \
   namespace isa {                 \
   template <int D, class P>       \
-  PairSweeps<D, P> sweeps(Kernel kernel, bool periodic); \
+  PairSweeps<D, P> sweeps(Kernel kernel, bool periodic, bool conjugate); \
   }
 VARVE_DECLARE(isa_baseline)
 #ifdef VARVE_X86_64
@@ -37,17 +37,17 @@ InstructionSet best_instruction_set() {
 }
 
 template <int D, class P>
-PairSweeps<D, P> pair_sweeps(Kernel kernel, bool periodic, InstructionSet set) {
+PairSweeps<D, P> pair_sweeps(Kernel kernel, bool periodic, bool conjugate, InstructionSet set) {
 #ifdef VARVE_X86_64
-  if (set == InstructionSet::v4) return isa_v4::sweeps<D, P>(kernel, periodic);
-  if (set == InstructionSet::v3) return isa_v3::sweeps<D, P>(kernel, periodic);
+  if (set == InstructionSet::v4) return isa_v4::sweeps<D, P>(kernel, periodic, conjugate);
+  if (set == InstructionSet::v3) return isa_v3::sweeps<D, P>(kernel, periodic, conjugate);
 #endif
   static_cast<void>(set);
-  return isa_baseline::sweeps<D, P>(kernel, periodic);
+  return isa_baseline::sweeps<D, P>(kernel, periodic, conjugate);
 }
 
 #define VARVE_INSTANTIATE(D, P) \
-  template PairSweeps<D, P> pair_sweeps<D, P>(Kernel, bool, InstructionSet);
+  template PairSweeps<D, P> pair_sweeps<D, P>(Kernel, bool, bool, InstructionSet);
 VARVE_INSTANTIATE(2, DoublePrecision)
 VARVE_INSTANTIATE(2, FloatPrecision)
 VARVE_INSTANTIATE(2, MixedPrecision)

@@ -53,12 +53,17 @@ struct SweepData {
   Real* superficial_density_next = nullptr;  // rhob(n+1)
   Real* volume = nullptr;                    // m / rhob(n+1)
   Real* pressure = nullptr;                  // [Pa]
-  Real* wall_pressure = nullptr;             // extrapolated
+  Real* wall_push = nullptr;                 // [Pa] `push` extrapolated
   Real* wall_velocity = nullptr;             // for viscosity: 2 v_wall - extrapolated
-  Real* stress_force = nullptr;              // [N] pressure and viscous force on a particle
+  Real* push = nullptr;  // [Pa] what pairs push each other with: p, unless `conjugate`
+  Real* stress_force = nullptr;  // [N] pressure and viscous force on a particle
+  Real* viscous_force = nullptr;  // [N] the viscous part of it; only where `conjugate`
 
   Real smoothing_length = 0, dt = 0, reference_density = 0, sound_speed = 0, viscosity = 0;
   Real diffusion = 0;               // delta of delta-SPH
+  Real tait_pressure = 0;           // [Pa] B of the Tait equation of state; 0: linear
+  Real artificial_alpha = 0, artificial_beta = 0;  // of Monaghan's viscosity
+  bool conjugate = false;           // pairs push as core/coupling.h says, and so do grains
   Real gravity[D] = {};             // felt by the fluid (0 in the excess-pressure form)
   Real hydrostatic_gradient[D] = {};  // d rho / dx of the fluid at rest (full pressure), else 0
   Position period[D] = {};          // [m] 0 where not periodic
@@ -68,9 +73,10 @@ struct SweepData {
 template <int D, class P>
 struct PairSweeps {
   using Loop = void (*)(const SweepData<D, P>&, std::size_t group_begin, std::size_t group_end);
-  Loop density = nullptr;        // fluid groups: rhob(n+1), volume, pressure
-  Loop extrapolate = nullptr;    // wall groups: wall_pressure, wall_velocity
-  Loop stress = nullptr;         // fluid groups: stress_force
+  Loop density = nullptr;        // fluid groups: rhob(n+1), volume, pressure, push
+  Loop extrapolate = nullptr;    // wall groups: wall_push, wall_velocity
+  Loop stress = nullptr;         // fluid groups: stress_force, viscous_force
+  Loop artificial = nullptr;     // fluid groups: adds artificial viscosity to stress_force
 };
 
 /// Instruction sets in ascending order of width.
@@ -80,6 +86,6 @@ std::string_view name_of(InstructionSet set);
 InstructionSet best_instruction_set();
 
 template <int D, class P>
-PairSweeps<D, P> pair_sweeps(Kernel kernel, bool periodic, InstructionSet set);
+PairSweeps<D, P> pair_sweeps(Kernel kernel, bool periodic, bool conjugate, InstructionSet set);
 
 }  // namespace varve::core

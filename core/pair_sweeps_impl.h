@@ -151,7 +151,8 @@ struct OwnIndex {
 /// density (Molteni and Colagrossi 2009):
 ///   d rhob_a/dt = rhob_a sum_b V_b v_ab . grad W_ab
 ///               + eps_a delta h c0 sum_fluid 2 (rho_a - rho_b) (W'/r) V_b
-/// then P = c0^2 (rhob/eps - rho0).
+/// then the pressure of the intrinsic density rho = rhob/eps: linear, P = c0^2 (rho - rho0), or
+/// Tait's, P = B ((rho/rho0)^7 - 1) with B = rho0 c0^2 / 7.
 template <int D, class P, Kernel K, bool periodic>
 void density_loop(const SweepData<D, P>& s, std::size_t group_begin, std::size_t group_end) {
   using Real = typename P::Real;
@@ -202,7 +203,15 @@ void density_loop(const SweepData<D, P>& s, std::size_t group_begin, std::size_t
       const Real next = rhob + s.dt * rate;
       s.superficial_density_next[i] = next;
       s.volume[i] = s.mass[i] / next;
-      s.pressure[i] = stiffness * (next / eps - s.reference_density);
+      Real pressure;
+      if (s.tait_pressure > Real(0)) {
+        const Real ratio = next / eps / s.reference_density, cube = ratio * ratio * ratio;
+        pressure = s.tait_pressure * (cube * cube * ratio - Real(1));
+      } else {
+        pressure = stiffness * (next / eps - s.reference_density);
+      }
+      s.pressure[i] = pressure;
+      s.push[i] = pressure;
     }
   }
 }
@@ -210,6 +219,9 @@ void density_loop(const SweepData<D, P>& s, std::size_t group_begin, std::size_t
 /// Adami, Hu and Adams 2012: pressure and velocity of dummy particles from the fluid around them,
 ///   P_w = (sum_f P_f W + g . sum_f rho_f (r_w - r_f) W) / sum_f W
 ///   v_w = 2 v_wall - sum_f v_f W / sum_f W
+/// with rho = rho0 + P / c0^2, which is exact for the linear equation of state and good to the
+/// square of the compression for Tait's. Where pairs push with something else than P, so do
+/// dummies.
 template <int D, class P, Kernel K, bool periodic>
 void extrapolate_loop(const SweepData<D, P>& s, std::size_t group_begin, std::size_t group_end) {
   using Real = typename P::Real;
@@ -233,7 +245,7 @@ void extrapolate_loop(const SweepData<D, P>& s, std::size_t group_begin, std::si
       }
       pair.template set<periodic>(x, s.position, safe, s.period, inverse_h);
       const Lane<Real> w = real * kernel_value<K, Real>(pair.q);
-      const Lane<Real> p = gather(s.pressure, safe, 1, 0);
+      const Lane<Real> p = gather<Real>(s.pressure, safe, 1, 0);
       const Lane<Real> rho = p / stiffness + s.reference_density;
       Lane<Real> head{};
       for (int c = 0; c < D; ++c) {
@@ -241,12 +253,12 @@ void extrapolate_loop(const SweepData<D, P>& s, std::size_t group_begin, std::si
         velocities[c] += w * gather(s.velocity, safe, D, c);
       }
       weights += w;
-      pressures += w * (p + rho * head);
+      pressures += w * (gather<Real>(s.push, safe, 1, 0) + rho * head);
     }
     for (std::size_t l = 0; l < own.used; ++l) {
       const std::size_t i = g * lanes + l;
       const bool near = weights[l] > Real(0);
-      s.wall_pressure[i] = near ? pressures[l] / weights[l] : Real(0);
+      s.wall_push[i] = near ? pressures[l] / weights[l] : Real(0);
       for (int c = 0; c < D; ++c) {
         const Real wall = s.wall_own_velocity[i * D + std::size_t(c)];
         s.wall_velocity[i * D + std::size_t(c)] =
@@ -258,7 +270,9 @@ void extrapolate_loop(const SweepData<D, P>& s, std::size_t group_begin, std::si
 
 /// Pressure and viscous force (Morris, Fox and Zhu 1997), antisymmetric pair by pair:
 ///   F_a = V_a sum_b V_b [ -(P_a + P_b) (W'/r) r_ab + 2 mu (W'/r) r^2/(r^2 + 0.01 h^2) v_ab ]
-template <int D, class P, Kernel K, bool periodic>
+/// with something else in place of P where grains take their part of the pressure work pair by pair
+/// (`conjugate`, core/coupling.h); the viscous part is then also stored by itself.
+template <int D, class P, Kernel K, bool periodic, bool conjugate>
 void stress_loop(const SweepData<D, P>& s, std::size_t group_begin, std::size_t group_end) {
   using Real = typename P::Real;
   using Position = typename P::Position;
@@ -270,68 +284,142 @@ void stress_loop(const SweepData<D, P>& s, std::size_t group_begin, std::size_t 
   for (std::size_t g = group_begin; g < group_end; ++g) {
     const OwnIndex own(g, s.count);
     Lane<Position> x[D];
-    Lane<Real> v[D], force[D];
+    Lane<Real> v[D], force[D] = {}, shear[D] = {};
     for (int c = 0; c < D; ++c) {
       x[c] = gather(s.position, own.index, D, c);
       v[c] = gather(s.velocity, own.index, D, c);
-      force[c] = Lane<Real>{};
     }
-    const Lane<Real> p = gather(s.pressure, own.index, 1, 0);
+    const Lane<Real> p = gather<Real>(s.push, own.index, 1, 0);
+    const auto add = [&](Lane<Real> push, Lane<Real> drag, int c, Lane<Real> other) {
+      if constexpr (conjugate) {
+        force[c] += push;
+        shear[c] += drag * (v[c] - other);
+      } else {
+        force[c] += push + drag * (v[c] - other);
+      }
+    };
     Separation<D, P> pair;
     for (std::uint32_t k = s.fluid.start[g]; k < s.fluid.start[g + 1]; ++k) {
       const std::int32_t* j = s.fluid.index + std::size_t(k) * lanes;
       pair.template set<periodic>(x, s.position, j, s.period, inverse_h);
       const Lane<Real> weight = gather(s.volume, j, 1, 0) * kernel_slope<K, Real>(pair.q);
-      const Lane<Real> push = -(p + gather(s.pressure, j, 1, 0)) * weight;
+      const Lane<Real> push = -(p + gather<Real>(s.push, j, 1, 0)) * weight;
       const Lane<Real> drag = viscous * weight * (pair.r2 / (pair.r2 + soft));
       for (int c = 0; c < D; ++c)
-        force[c] += push * pair.d[c] + drag * (v[c] - gather(s.velocity, j, D, c));
+        add(push * pair.d[c], drag, c, gather(s.velocity, j, D, c));
     }
     for (std::uint32_t k = s.walls.start[g]; k < s.walls.start[g + 1]; ++k) {
       const std::int32_t* j = s.walls.index + std::size_t(k) * lanes;
       pair.template set<periodic>(x, s.wall_position, j, s.period, inverse_h);
       const Lane<Real> slope = kernel_slope<K, Real>(pair.q);
       const Lane<Real> push =
-          -(p + gather(s.wall_pressure, j, 1, 0)) * (gather(s.wall_volume, j, 1, 0) * slope);
+          -(p + gather<Real>(s.wall_push, j, 1, 0)) * (gather(s.wall_volume, j, 1, 0) * slope);
       const Lane<Real> drag = viscous * (gather(s.wall_viscous_volume, j, 1, 0) * slope) *
                               (pair.r2 / (pair.r2 + soft));
       for (int c = 0; c < D; ++c)
-        force[c] += push * pair.d[c] + drag * (v[c] - gather(s.wall_velocity, j, D, c));
+        add(push * pair.d[c], drag, c, gather<Real>(s.wall_velocity, j, D, c));
     }
     for (std::size_t l = 0; l < own.used; ++l) {
       const std::size_t i = g * lanes + l;
       for (int c = 0; c < D; ++c)
-        s.stress_force[i * D + std::size_t(c)] = slope_scale * s.volume[i] * force[c][l];
+        if constexpr (conjugate) {
+          const Real viscous_part = slope_scale * s.volume[i] * shear[c][l];
+          s.viscous_force[i * D + std::size_t(c)] = viscous_part;
+          s.stress_force[i * D + std::size_t(c)] =
+              slope_scale * s.volume[i] * force[c][l] + viscous_part;
+        } else {
+          s.stress_force[i * D + std::size_t(c)] = slope_scale * s.volume[i] * force[c][l];
+        }
     }
   }
 }
 
+/// Artificial viscosity (Monaghan 1992), for pairs that approach:
+///   F_a -= sum_b m_a m_b Pi_ab (W'/r) r_ab,  Pi_ab = (-alpha c0 phi + beta phi^2) / rhobar_ab,
+///   phi = h v_ab . r_ab / (r^2 + 0.01 h^2),
+/// with masses and densities per volume of mixture. A dummy counts with the density of the fluid
+/// beside it and the velocity of its wall.
+template <int D, class P, Kernel K, bool periodic>
+void artificial_loop(const SweepData<D, P>& s, std::size_t group_begin, std::size_t group_end) {
+  using Real = typename P::Real;
+  using Position = typename P::Position;
+  const Real h = s.smoothing_length, inverse_h = Real(1) / h;
+  const Real slope_scale =
+      normalisation<K, D, Real>() / power_of_length<D>(h) * inverse_h * inverse_h;
+  const Real soft = Real(0.01) * h * h, linear = s.artificial_alpha * s.sound_speed;
+  for (std::size_t g = group_begin; g < group_end; ++g) {
+    const OwnIndex own(g, s.count);
+    Lane<Position> x[D];
+    Lane<Real> v[D], force[D] = {}, other_v[D];
+    for (int c = 0; c < D; ++c) {
+      x[c] = gather(s.position, own.index, D, c);
+      v[c] = gather(s.velocity, own.index, D, c);
+    }
+    const Lane<Real> rhob = gather<Real>(s.superficial_density_next, own.index, 1, 0);
+    Separation<D, P> pair;
+    const auto add = [&](Lane<Real> volume, Lane<Real> other_rhob) {
+      Lane<Real> approach{};
+      for (int c = 0; c < D; ++c) approach += (v[c] - other_v[c]) * pair.d[c];
+      // Negative where they approach, else an exact zero.
+      const Lane<Real> phi = -positive<Real>(-approach) * h / (pair.r2 + soft);
+      const Lane<Real> mean = Real(0.5) * (rhob + other_rhob);
+      const Lane<Real> push = -(volume * rhob * other_rhob / mean) *
+                              (s.artificial_beta * phi - linear) * phi *
+                              kernel_slope<K, Real>(pair.q);
+      for (int c = 0; c < D; ++c) force[c] += push * pair.d[c];
+    };
+    for (std::uint32_t k = s.fluid.start[g]; k < s.fluid.start[g + 1]; ++k) {
+      const std::int32_t* j = s.fluid.index + std::size_t(k) * lanes;
+      pair.template set<periodic>(x, s.position, j, s.period, inverse_h);
+      for (int c = 0; c < D; ++c) other_v[c] = gather(s.velocity, j, D, c);
+      add(gather<Real>(s.volume, j, 1, 0), gather<Real>(s.superficial_density_next, j, 1, 0));
+    }
+    for (std::uint32_t k = s.walls.start[g]; k < s.walls.start[g + 1]; ++k) {
+      const std::int32_t* j = s.walls.index + std::size_t(k) * lanes;
+      pair.template set<periodic>(x, s.wall_position, j, s.period, inverse_h);
+      for (int c = 0; c < D; ++c) other_v[c] = gather(s.wall_own_velocity, j, D, c);
+      add(gather(s.wall_volume, j, 1, 0), rhob);
+    }
+    for (std::size_t l = 0; l < own.used; ++l) {
+      const std::size_t i = g * lanes + l;
+      for (int c = 0; c < D; ++c) {
+        const Real each = slope_scale * s.volume[i] * force[c][l];
+        s.stress_force[i * D + std::size_t(c)] += each;
+        if (s.conjugate) s.viscous_force[i * D + std::size_t(c)] += each;
+      }
+    }
+  }
+}
+
+template <int D, class P, Kernel K, bool periodic>
+PairSweeps<D, P> sweeps_of(bool conjugate) {
+  return {density_loop<D, P, K, periodic>, extrapolate_loop<D, P, K, periodic>,
+          conjugate ? stress_loop<D, P, K, periodic, true> : stress_loop<D, P, K, periodic, false>,
+          artificial_loop<D, P, K, periodic>};
+}
+
 template <int D, class P, Kernel K>
-PairSweeps<D, P> sweeps_for(bool periodic) {
-  if (periodic)
-    return {density_loop<D, P, K, true>, extrapolate_loop<D, P, K, true>,
-            stress_loop<D, P, K, true>};
-  return {density_loop<D, P, K, false>, extrapolate_loop<D, P, K, false>,
-          stress_loop<D, P, K, false>};
+PairSweeps<D, P> sweeps_for(bool periodic, bool conjugate) {
+  return periodic ? sweeps_of<D, P, K, true>(conjugate) : sweeps_of<D, P, K, false>(conjugate);
 }
 
 }  // namespace
 
 template <int D, class P>
-PairSweeps<D, P> sweeps(Kernel kernel, bool periodic) {
+PairSweeps<D, P> sweeps(Kernel kernel, bool periodic, bool conjugate) {
   switch (kernel) {
-    case Kernel::cubic: return sweeps_for<D, P, Kernel::cubic>(periodic);
-    case Kernel::quintic: return sweeps_for<D, P, Kernel::quintic>(periodic);
+    case Kernel::cubic: return sweeps_for<D, P, Kernel::cubic>(periodic, conjugate);
+    case Kernel::quintic: return sweeps_for<D, P, Kernel::quintic>(periodic, conjugate);
     case Kernel::wendland_c2: break;
   }
-  return sweeps_for<D, P, Kernel::wendland_c2>(periodic);
+  return sweeps_for<D, P, Kernel::wendland_c2>(periodic, conjugate);
 }
 
-template PairSweeps<2, DoublePrecision> sweeps<2, DoublePrecision>(Kernel, bool);
-template PairSweeps<2, FloatPrecision> sweeps<2, FloatPrecision>(Kernel, bool);
-template PairSweeps<2, MixedPrecision> sweeps<2, MixedPrecision>(Kernel, bool);
-template PairSweeps<3, DoublePrecision> sweeps<3, DoublePrecision>(Kernel, bool);
-template PairSweeps<3, FloatPrecision> sweeps<3, FloatPrecision>(Kernel, bool);
-template PairSweeps<3, MixedPrecision> sweeps<3, MixedPrecision>(Kernel, bool);
+template PairSweeps<2, DoublePrecision> sweeps<2, DoublePrecision>(Kernel, bool, bool);
+template PairSweeps<2, FloatPrecision> sweeps<2, FloatPrecision>(Kernel, bool, bool);
+template PairSweeps<2, MixedPrecision> sweeps<2, MixedPrecision>(Kernel, bool, bool);
+template PairSweeps<3, DoublePrecision> sweeps<3, DoublePrecision>(Kernel, bool, bool);
+template PairSweeps<3, FloatPrecision> sweeps<3, FloatPrecision>(Kernel, bool, bool);
+template PairSweeps<3, MixedPrecision> sweeps<3, MixedPrecision>(Kernel, bool, bool);
 
 }  // namespace varve::core::VARVE_ISA

@@ -13,6 +13,8 @@ using namespace std::string_view_literals;
 constexpr std::array precisions{"double"sv, "float"sv, "mixed"sv};
 constexpr std::array boundaries{"no_slip"sv, "free_slip"sv, "periodic"sv, "free"sv};
 constexpr std::array pressure_forms{"auto"sv, "excess"sv, "full"sv};
+constexpr std::array equations_of_state{"linear"sv, "tait"sv};
+constexpr std::array pressure_forces{"conjugate"sv, "averaged"sv};
 constexpr std::array porosities{"kernel"sv, "conservative"sv};
 constexpr std::array coupling_modes{"two_way"sv, "one_way"sv, "off"sv};
 constexpr std::array drags{"stokes"sv, "schiller_naumann"sv, "dallavalle_di_felice"sv, "gidaspow"sv,
@@ -135,6 +137,15 @@ void add_scene(std::vector<Parameter>& table) {
            "numerical; auto: 10 x the fluid's and 20 x the grains' largest expected speed"));
   add(choice("fluid.pressure", pressure_forms, Change::never, VARVE_CHOICE(fluid.pressure),
              "excess: hydrostatics taken out analytically; full: needed under a free surface"));
+  add(choice("fluid.equation_of_state", equations_of_state, Change::never,
+             VARVE_CHOICE(fluid.equation_of_state),
+             "linear: P = c0^2 (rho - rho0); tait: exponent 7, stiffer when compressed"));
+  add(real("fluid.artificial_alpha", "", pure, {0, 4}, given, Change::never,
+           VARVE_REAL(fluid.artificial_alpha),
+           "artificial viscosity (Monaghan), linear term; acts like nu = alpha c0 h / 8 (2D)"));
+  add(real("fluid.artificial_beta", "", pure, {0, 10}, given, Change::never,
+           VARVE_REAL(fluid.artificial_beta),
+           "artificial viscosity (Monaghan), quadratic term"));
   add(real("fluid.density_diffusion", "", pure, {0, 1}, given, Change::never,
            VARVE_REAL(fluid.density_diffusion), "delta of delta-SPH"));
   add(real("fluid.jitter", "", pure, {0, 0.5}, given, Change::never, VARVE_REAL(fluid.jitter),
@@ -213,6 +224,10 @@ void add_coupling(std::vector<Parameter>& table) {
   add(choice("coupling.drag", drags, Change::never, VARVE_CHOICE(coupling.drag), "drag law"));
   add(choice("coupling.porosity", porosities, Change::never, VARVE_CHOICE(coupling.porosity),
              "conservative: a grain's volume is never lost through walls"));
+  add(choice("coupling.pressure_force", pressure_forces, Change::never,
+             VARVE_CHOICE(coupling.pressure_force),
+             "conjugate: from the work that grains do on the fluid's density, stable in dense "
+             "heaps; averaged: mean of -grad p around a grain, as the study has it"));
   add(real("coupling.porosity_floor", "", pure, {0, 1, true}, automatic_ok, Change::never,
            VARVE_REAL(coupling.porosity_floor),
            "least porosity used in density and drag; auto: 0.30 in 2D, 0.25 in 3D"));

@@ -13,6 +13,9 @@ namespace varve::core {
 enum class Precision { double_, float_, mixed };
 enum class Boundary { no_slip, free_slip, periodic, free };
 enum class PressureForm { automatic, excess, full };
+enum class EquationOfState { linear, tait };
+/// How the fluid's pressure gets at a grain (core/coupling.h).
+enum class PressureForce { conjugate, averaged };
 enum class Porosity { kernel, conservative };
 enum class CouplingMode { two_way, one_way, off };
 enum class Drag { stokes, schiller_naumann, dallavalle_di_felice, gidaspow, cylinder };
@@ -56,6 +59,8 @@ struct Fluid {
   double smoothing_ratio = 1.25;   // [-] smoothing_length / spacing
   double sound_speed = automatic;  // [m/s] c0
   PressureForm pressure = PressureForm::automatic;
+  EquationOfState equation_of_state = EquationOfState::linear;
+  double artificial_alpha = 0, artificial_beta = 0;  // [-] of Monaghan's viscosity
   double density_diffusion = 0.1;  // [-] delta of delta-SPH
   double jitter = 0;               // [-] of the spacing
   std::int64_t seed = 1;
@@ -93,6 +98,7 @@ struct Coupling {
   double length = automatic;  // [m] hc; a grain diameter if not given
   Drag drag = Drag::dallavalle_di_felice;
   Porosity porosity = Porosity::kernel;
+  PressureForce pressure_force = PressureForce::conjugate;
   double porosity_floor = automatic;  // [-] 0.30 in 2D, 0.25 in 3D
   bool exclude_own_volume = true;
 };

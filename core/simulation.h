@@ -17,7 +17,7 @@
 namespace varve::core {
 
 /// Raised whenever a golden digest changes; the commit says why.
-inline constexpr std::uint32_t engine_revision = 1;
+inline constexpr std::uint32_t engine_revision = 2;
 
 enum class FieldType { f64, f32, u64, u32, u8 };
 

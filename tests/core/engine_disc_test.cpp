@@ -12,7 +12,7 @@ namespace {
 struct DiscRun {
   double contact_time = -1;
   double plateau = 0;  // [m/s] mean speed over 0.30 to 0.50 s
-  double elastic = 0, fluid = 0, weight = 0;  // [N] means over 0.1 s around 1.5 s, upwards
+  double elastic = 0, fluid = 0, weight = 0;  // [N] means over 0.1 s around 3 s, upwards
   double worst_momentum = 0, worst_reaction = 0;
 
   DiscRun() {
@@ -21,7 +21,7 @@ struct DiscRun {
     weight = -(scenario.grains.density - scenario.fluid.density) * 0.25 * 3.14159265358979323846 *
              scenario.grains.diameter * scenario.grains.diameter * scenario.gravity.magnitude;
     int plateau_steps = 0, rest_steps = 0;
-    while (simulation->clock().time < 1.55) {
+    while (simulation->clock().time < 3.05) {
       simulation->advance();
       const double t = simulation->clock().time;
       const std::vector<double> v = field(*simulation, "grains.velocity");
@@ -34,7 +34,7 @@ struct DiscRun {
         plateau += std::sqrt(v[0] * v[0] + v[1] * v[1]);
         ++plateau_steps;
       }
-      if (t >= 1.45) {
+      if (t >= 2.95) {
         const GrainReport report = simulation->grain_reports().at(0);
         elastic += scenario.contact.stiffness * (0.5 * scenario.grains.diameter - x[1]);
         fluid += report.hydrodynamic[1] + report.drag[1];
@@ -62,7 +62,7 @@ TEST(EngineDiscSlow, FallsTouchesAndRestsAsTheBenchmarkSaysAndKeepsMomentum) {
   EXPECT_GE(run.plateau, 0.052);
   EXPECT_LE(run.plateau, 0.060);
   EXPECT_NEAR(-run.elastic / (run.weight + run.fluid), 1, 1e-3);
-  EXPECT_NEAR(-run.elastic / run.weight, 1, 1e-2);
+  EXPECT_NEAR(-run.elastic / run.weight, 1, 5e-3);
   EXPECT_LE(run.worst_momentum, 1e-12);
   EXPECT_GT(run.worst_momentum, 0);
   EXPECT_LE(run.worst_reaction, 1e-12);

@@ -39,6 +39,39 @@ TEST(EngineHeap, OfNineGrainsOnTheFloorKeepsTheFluidInside) {
     }
 }
 
+/// Mean square speed of the fluid [m2/s2].
+double fluid_speed2(const Simulation& simulation) {
+  double sum = 0;
+  const std::vector<double> v = field(simulation, "fluid.velocity");
+  for (const double each : v) sum += each * each;
+  return 2 * sum / static_cast<double>(v.size());
+}
+
+// The averaged form feeds the fluid between packed grains until a guard stops the run; the
+// conjugate one lets a heap of the same grains come to rest.
+TEST(EngineHeapSlow, OfManyGrainsComesToRestInTheFluidWithConjugateForces) {
+  Scenario scenario = small_column();
+  scenario.domain.width = 0.03;
+  scenario.domain.height = 0.04;
+  scenario.grains.rows = 4;
+  scenario.grains.columns = 8;
+  scenario.grains.velocity_x = 0;
+  scenario.grains.lowest_y = automatic;
+  scenario.guards.density_deviation = 0.8;
+  const auto simulation = started(scenario);
+  double fastest = 0;
+  while (simulation->clock().time < 1.2) {
+    simulation->advance();
+    fastest = std::max(fastest, fluid_speed2(*simulation));
+  }
+  double left = 0;
+  for (const double v : field(*simulation, "grains.velocity"))
+    left = std::max(left, std::abs(v));
+  EXPECT_LT(left, 5e-3);
+  EXPECT_LT(fluid_speed2(*simulation), 0.1 * fastest);
+  EXPECT_LT(deepest(*simulation), 0.5 * scenario.fluid.spacing);
+}
+
 TEST(EngineHeap, WithoutFluidComesToRestAndTheFloorCarriesItsWeight) {
   Scenario scenario = small_column();
   scenario.fluid.present = false;

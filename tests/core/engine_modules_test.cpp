@@ -35,12 +35,19 @@ std::map<std::string, std::uint64_t> passes(Simulation& simulation) {
 }
 
 TEST(EngineModules, FluidAndGrainsTogetherRunEverything) {
-  const auto simulation = started(small_column());
+  Scenario scenario = small_column();
+  scenario.fluid.artificial_alpha = 0.01;
+  const auto simulation = started(scenario);
   EXPECT_THAT(table_names(*simulation), Contains("contacts"));
   EXPECT_THAT(table_names(*simulation), Contains("work"));
   auto count = passes(*simulation);
   count.erase("lists");
   for (const auto& [name, ran] : count) EXPECT_EQ(ran, 10u) << name;
+}
+
+TEST(EngineModules, ArtificialViscosityIsNoPassUnlessAskedFor) {
+  const auto simulation = started(small_column());
+  EXPECT_EQ(passes(*simulation)["artificial_viscosity"], 0u);
 }
 
 TEST(EngineModules, WithoutGrainsThereIsNoFieldTableOrStageOfThem) {
