@@ -39,7 +39,7 @@ struct FluidView {
   std::span<const Vec<typename P::Real, D>> velocity;
   std::span<const typename P::Real> volume;        // [m3] m / rhob
   std::span<const Vec<typename P::Real, D>> stress_force;  // [N] on each fluid particle
-  std::span<const typename P::Real> pressure, porosity;  // [Pa], unfloored; conjugate form only
+  std::span<const typename P::Real> pressure = {}, porosity = {};  // conjugate: [Pa]; unfloored
 };
 
 /// What the fluid does to one grain during a step.
