@@ -212,8 +212,8 @@ void follow_porosity(DoubleState<D>& state, const std::vector<double>& eps_befor
   }
 }
 
-/// [m3, m2 in 2D] Room for fluid in a full box: the sum of eps dx^D over a lattice of fluid at rest.
-/// Of each grain it counts as much as the fluid there will feel of it.
+/// [m3, m2 in 2D] Room for fluid in a full box: the sum of eps dx^D over a lattice of fluid at
+/// rest. Of each grain it counts as much as the fluid there will feel of it.
 template <int D>
 double room_for_fluid(const Scenario& scenario, const DoubleState<D>& with_grains) {
   const double dx = scenario.fluid.spacing;
@@ -422,8 +422,8 @@ Narrowed<D> narrowed(const Move<D>& move, const DoubleState<D>& state,
   return result;
 }
 
-/// `room_lost` [m3, m2 in 2D]: swept volume less the volume of grains in it, by which the fluid gets
-/// less.
+/// `room_lost` [m3, m2 in 2D]: swept volume less the volume of grains in it, by which the fluid
+/// gets less.
 template <int D>
 void narrow_fluid(const Move<D>& move, const std::vector<double>& eps_before, double room_lost,
                   DoubleState<D>& state, GeometryReport& report) {
