@@ -140,6 +140,16 @@ class Assessor {
            number_text(s_.fluid.sound_speed) + " m/s is below " + rough_number(needed) +
                " m/s (10 x the fluid's, 20 x the grains' expected speed): the fluid will be "
                "compressed noticeably");
+    if (s_.fluid.artificial_alpha > 0) {
+      const double added = s_.fluid.artificial_alpha * s_.fluid.sound_speed *
+                           smoothing_length(s_) /
+                           (2 * (static_cast<double>(s_.domain.dimension) + 2));
+      const double real = s_.fluid.viscosity / s_.fluid.density;
+      if (added > 0.05 * real)
+        warn("fluid.artificial_alpha",
+             setting("fluid.artificial_alpha", s_) + ": acts like " + rough_number(added / real) +
+                 " times the fluid's viscosity; Reynolds numbers are not those of the scenario");
+    }
     if (s_.fluid.density_diffusion == 0)
       warn("fluid.density_diffusion",
            "0: pressure noise is about ten times larger without density diffusion");
@@ -229,6 +239,13 @@ std::vector<ModelUse> models_of(const Scenario& s) {
   add("viscosity", fluid, fluid ? setting("fluid.viscosity", s) : "no fluid");
   add("density diffusion", fluid && s.fluid.density_diffusion > 0,
       fluid ? setting("fluid.density_diffusion", s) : "no fluid");
+  const bool artificial = s.fluid.artificial_alpha > 0 || s.fluid.artificial_beta > 0;
+  add("artificial viscosity", fluid && artificial,
+      fluid ? setting("fluid.artificial_alpha", s) + ", " + setting("fluid.artificial_beta", s)
+            : "no fluid");
+  const bool tait = s.fluid.equation_of_state == EquationOfState::tait;
+  add("Tait's equation", fluid && tait,
+      fluid ? setting("fluid.equation_of_state", s) : "no fluid");
   const bool excess = fluid && s.fluid.pressure == PressureForm::excess;
   add("excess pressure", excess,
       !fluid  ? "no fluid"
@@ -264,6 +281,10 @@ std::vector<ModelUse> models_of(const Scenario& s) {
   add("coupling", coupled, alone.empty() ? setting("coupling.mode", s) : alone);
   add("reaction on the fluid", coupled && s.coupling.mode == CouplingMode::two_way,
       alone.empty() ? setting("coupling.mode", s) : alone);
+  const bool both = coupled && s.coupling.mode == CouplingMode::two_way;
+  add("conjugate pressure", both && s.coupling.pressure_force == PressureForce::conjugate,
+      both ? setting("coupling.pressure_force", s) : alone.empty() ? setting("coupling.mode", s)
+                                                                   : alone);
   add("drag", coupled,
       !alone.empty() ? alone : setting(coupled ? "coupling.drag" : "coupling.mode", s));
   const bool stepped = moving && substeps(s) > 1;

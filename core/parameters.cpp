@@ -11,6 +11,8 @@ using namespace std::string_view_literals;
 
 // Each list is in its enum's order; a shorter one leaves out what the key does not allow.
 constexpr std::array precisions{"double"sv, "float"sv, "mixed"sv};
+constexpr std::array models{"standard"sv, "study"sv};
+constexpr std::array fidelities{"draft"sv, "standard"sv, "fine"sv, "reference"sv};
 constexpr std::array boundaries{"no_slip"sv, "free_slip"sv, "periodic"sv, "free"sv};
 constexpr std::array pressure_forms{"auto"sv, "excess"sv, "full"sv};
 constexpr std::array equations_of_state{"linear"sv, "tait"sv};
@@ -83,6 +85,10 @@ void add_scene(std::vector<Parameter>& table) {
   add(text("scenario.title", Change::never, VARVE_TEXT(title), "one line for people"));
   add(choice("scenario.precision", precisions, Change::never, VARVE_CHOICE(precision),
              "scalar type of the state; mixed: single, with positions in double"));
+  add(choice("scenario.model", models, Change::never, VARVE_CHOICE(model),
+             "defaults of the models; study: those of the study that varve reproduces"));
+  add(choice("scenario.fidelity", fidelities, Change::never, VARVE_CHOICE(fidelity),
+             "defaults of resolution, sound speed, time step and precision: speed for accuracy"));
 
   add(whole("domain.dimension", {2, 3}, Change::never, VARVE_WHOLE(domain.dimension),
             "2: discs, everything per metre of depth; 3: spheres"));
@@ -121,8 +127,13 @@ void add_scene(std::vector<Parameter>& table) {
            VARVE_REAL(fluid.density), "at rest"));
   add(real("fluid.viscosity", "Pa s", viscosity, {0, 1e6, true}, given, Change::parameter,
            VARVE_REAL(fluid.viscosity), "dynamic"));
-  add(real("fluid.spacing", "m", length, positive, given, Change::never, VARVE_REAL(fluid.spacing),
-           "of the first lattice of fluid particles: the resolution"));
+  add(real("fluid.spacing", "m", length, positive, automatic_ok, Change::never,
+           VARVE_REAL(fluid.spacing),
+           "of the first lattice of fluid particles; auto: by fluid.resolution"));
+  add(real("fluid.resolution", "", pure, {0.5, 100}, given, Change::never,
+           VARVE_REAL(fluid.resolution),
+           "of an automatic spacing: at least so many to a grain diameter, or 16 times as many to "
+           "the domain's least extent where there are no grains"));
   add(real("fluid.level", "m", length, positive, automatic_ok, Change::never,
            VARVE_REAL(fluid.level), "filling height above the bottom; auto: the domain's height"));
   add(real("fluid.width", "m", length, positive, automatic_ok, Change::never,
@@ -135,6 +146,8 @@ void add_scene(std::vector<Parameter>& table) {
   add(real("fluid.sound_speed", "m/s", speed, {0, 1e6, true}, automatic_ok, Change::never,
            VARVE_REAL(fluid.sound_speed),
            "numerical; auto: 10 x the fluid's and 20 x the grains' largest expected speed"));
+  add(real("fluid.sound_speed_factor", "", pure, {0.1, 100}, given, Change::never,
+           VARVE_REAL(fluid.sound_speed_factor), "of the automatic sound speed"));
   add(choice("fluid.pressure", pressure_forms, Change::never, VARVE_CHOICE(fluid.pressure),
              "excess: hydrostatics taken out analytically; full: needed under a free surface"));
   add(choice("fluid.equation_of_state", equations_of_state, Change::never,

@@ -138,9 +138,42 @@ class Resolver {
                      " (or change fluid.spacing)");
   }
 
+  /// The largest spacing by fluid.resolution that divides the extents which the lattice fills.
+  void resolve_spacing() {
+    if (!std::isnan(s_.fluid.spacing)) return;
+    const bool solid = s_.domain.dimension == 3;
+    double extents[] = {s_.fluid.level, solid ? s_.domain.depth : s_.domain.width,
+                        std::isnan(s_.fluid.width) ? s_.domain.width : s_.fluid.width};
+    double size = s_.grains.diameter;
+    if (!s_.has_grains()) {
+      size = std::min(s_.domain.width, s_.domain.height) / 16;
+      if (solid) size = std::min(size, s_.domain.depth / 16);
+    }
+    const double fewest = std::ceil(s_.domain.width * s_.fluid.resolution / size - rounding);
+    for (double n = std::max(1.0, fewest); n <= 4 * fewest && n < particles_max; ++n) {
+      const double spacing = s_.domain.width / n;
+      bool fits = true;
+      for (const double extent : extents) {
+        const double exact = extent / spacing;
+        fits = fits && std::abs(exact - std::floor(exact + 0.5)) <= 1e-6;
+      }
+      if (!fits) continue;
+      s_.fluid.spacing = spacing;
+      return;
+    }
+    problem("fluid.spacing", "auto finds none near " + rough_number(size / s_.fluid.resolution) +
+                                 " m (fluid.resolution) that divides the domain; give a value");
+    s_.fluid.spacing = size / s_.fluid.resolution;
+  }
+
   void resolve_fluid() {
-    if (!s_.has_fluid()) return;
+    if (!s_.has_fluid()) {
+      if (std::isnan(s_.fluid.spacing)) s_.fluid.spacing = Fluid{}.spacing;
+      return;
+    }
     if (std::isnan(s_.fluid.level)) s_.fluid.level = s_.domain.height;
+    resolve_spacing();
+    if (!problems_.empty()) return;
     if (s_.fluid.level > s_.domain.height * (1 + rounding))
       problem("fluid.level", number_text(s_.fluid.level) +
                                  " m is above the domain; largest value " +
@@ -334,7 +367,7 @@ class Resolver {
 
   void resolve_sound_speed() {
     if (!s_.has_fluid() || !std::isnan(s_.fluid.sound_speed)) return;
-    const double speed = expected_speeds(s_).sound_speed();
+    const double speed = s_.fluid.sound_speed_factor * expected_speeds(s_).sound_speed();
     const Parameter& parameter = *find_parameter("fluid.sound_speed");
     if (!(speed <= parameter.highest)) {
       problem("fluid.sound_speed", "auto gives " + rough_number(speed) +

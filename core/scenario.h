@@ -11,6 +11,9 @@
 namespace varve::core {
 
 enum class Precision { double_, float_, mixed };
+/// Sets of defaults, applied under everything that a scenario says itself (tools/scenario_levels.h).
+enum class Model { standard, study };
+enum class Fidelity { draft, standard, fine, reference };
 enum class Boundary { no_slip, free_slip, periodic, free };
 enum class PressureForm { automatic, excess, full };
 enum class EquationOfState { linear, tait };
@@ -53,11 +56,13 @@ struct Fluid {
   double density = 1000;       // [kg/m3] rho0
   double viscosity = 0.01;     // [Pa s] mu
   double spacing = 1e-3;       // [m] dx of the first lattice
+  double resolution = 2.5;     // [-] of an automatic spacing: spacings per grain diameter
   double level = automatic;    // [m] filling height above the bottom; else the domain's height
   double width = automatic;    // [m] filled from the left wall; stays automatic for all of it
   Kernel kernel = Kernel::wendland_c2;
   double smoothing_ratio = 1.25;   // [-] smoothing_length / spacing
   double sound_speed = automatic;  // [m/s] c0
+  double sound_speed_factor = 1;   // [-] of the automatic one
   PressureForm pressure = PressureForm::automatic;
   EquationOfState equation_of_state = EquationOfState::linear;
   double artificial_alpha = 0, artificial_beta = 0;  // [-] of Monaghan's viscosity
@@ -138,6 +143,8 @@ struct ScheduledChange {
 struct Scenario {
   std::string title;
   Precision precision = Precision::double_;
+  Model model = Model::standard;
+  Fidelity fidelity = Fidelity::standard;
   Domain domain;
   Gravity gravity;
   Fluid fluid;

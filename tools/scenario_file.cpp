@@ -14,6 +14,7 @@
 
 #include "core/parameters.h"
 #include "tools/cli.h"
+#include "tools/scenario_levels.h"
 #include "tools/scenario_scan.h"
 
 namespace varve::tools {
@@ -53,6 +54,22 @@ class ScenarioReader {
     for (const ScannedEntry& entry : scan.entries) {
       if (entry.key == preset_key) continue;
       set(entry.key, entry.value, {source, entry.line, entry.key_column, entry.value_column});
+    }
+  }
+
+  /// Takes the levels that the sources name, the strongest source's word for each, under all of
+  /// them: to be called first.
+  void take_levels(std::string_view text, const std::vector<std::string>& settings) {
+    for (const std::string_view key : level_keys) {
+      std::string value = level_in(text, key);
+      for (const std::string& setting : settings) {
+        const std::size_t equals = setting.find('=');
+        if (equals != std::string::npos && trimmed(setting.substr(0, equals)) == key)
+          value = trimmed(setting.substr(equals + 1));
+      }
+      const ScenarioLevel* level = find_level(key, value);
+      if (level && !level->text.empty())
+        take_text(level->text, fmt::format("{} {}", key, level->value));
     }
   }
 
@@ -96,6 +113,17 @@ class ScenarioReader {
   }
 
  private:
+  /// What a scenario's text, or else the preset it starts from, says of a key; empty if nothing.
+  static std::string level_in(std::string_view text, std::string_view key) {
+    std::string value;
+    for (const ScannedEntry& entry : scan_scenario(text, "").entries) {
+      if (entry.key == key) return entry.value;
+      const Preset* preset = entry.key == preset_key ? find_preset(entry.value) : nullptr;
+      if (preset && preset->text != text) value = level_in(preset->text, key);
+    }
+    return value;
+  }
+
   static std::string trimmed(std::string text) {
     const std::size_t first = text.find_first_not_of(" \t");
     if (first == std::string::npos) return "";
@@ -318,6 +346,7 @@ ScenarioError::ScenarioError(std::vector<Diagnostic> found)
 ScenarioSource read_scenario_text(std::string_view text, const std::string& name,
                                   const ScenarioOptions& options) {
   ScenarioReader reader;
+  if (!options.resolved) reader.take_levels(text, options.settings);
   reader.take_text(text, name);
   reader.take_settings(options.settings);
   ScenarioSource source;

@@ -72,7 +72,7 @@ TEST(ScenarioFile, AllErrorsAtOnceWithTheirPlaces) {
           "bad.cfg:10:12: error: contact.friction: 'nan' is not a finite number; expected a ratio "
           "0..1e+06",
           "bad.cfg:12:11: error: fluid.spacing: '-1 mm' is out of range; expected a length > 0 (m, "
-          "cm, mm, um)",
+          "cm, mm, um), or auto",
           "bad.cfg:14:1: error: 'contact.stiffness' was already set on line 8",
           "bad.cfg:16:8: error: grains.rows: '2.5' is not a whole number; expected a whole number "
           "0..1000000000",
@@ -123,8 +123,8 @@ TEST(ScenarioFile, CommentsMarksAndLineEndings) {
   EXPECT_EQ(s.time.steps, 10);
   EXPECT_THAT(errors_of(box + "[fluid]\nspacing = 1 mm ; fine\n"),
               ElementsAre(HasSubstr("bad.cfg:7:11: error: fluid.spacing: '1 mm ; fine' has an "
-                                    "unknown unit; expected a length > 0 (m, cm, mm, um) (comments "
-                                    "start with '#')")));
+                                    "unknown unit; expected a length > 0 (m, cm, mm, um), or auto "
+                                    "(comments start with '#')")));
 }
 
 TEST(ScenarioFile, WhatIsNoText) {
