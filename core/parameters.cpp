@@ -120,7 +120,10 @@ void add_scene(std::vector<Parameter>& table) {
            VARVE_REAL(gravity.magnitude), "0: none"));
   add(real("gravity.tilt", "rad", pure, {-3.2, 3.2}, given, Change::parameter,
            VARVE_REAL(gravity.tilt), "direction, from straight down towards +x"));
+}
 
+void add_fluid(std::vector<Parameter>& table) {
+  const auto add = [&table](Parameter parameter) { table.push_back(parameter); };
   add(flag("fluid.present", Change::never, VARVE_FLAG(fluid.present),
            "off: a scene of grains only, no fluid is built, run or recorded"));
   add(real("fluid.density", "kg/m3", density, {0, 1e6, true}, given, Change::never,
@@ -285,6 +288,7 @@ void add_coupling(std::vector<Parameter>& table) {
 std::vector<Parameter> make_table() {
   std::vector<Parameter> table;
   add_scene(table);
+  add_fluid(table);
   add_grains(table);
   add_coupling(table);
   return table;

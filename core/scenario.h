@@ -11,7 +11,7 @@
 namespace varve::core {
 
 enum class Precision { double_, float_, mixed };
-/// Sets of defaults, applied under everything that a scenario says itself (tools/scenario_levels.h).
+/// Names of sets of defaults, which lie under everything that a scenario says itself.
 enum class Model { standard, study };
 enum class Fidelity { draft, standard, fine, reference };
 enum class Boundary { no_slip, free_slip, periodic, free };

@@ -95,7 +95,8 @@ TEST(ScenarioLevels, AnUnknownOneIsAnErrorAtItsPlace) {
     read("[scenario]\nfidelity = best\n" + disc);
     FAIL() << "not refused";
   } catch (const ScenarioError& error) {
-    EXPECT_THAT(error.what(), testing::HasSubstr("good.cfg:2:12: error: scenario.fidelity: 'best'"));
+    EXPECT_THAT(error.what(),
+                testing::HasSubstr("good.cfg:2:12: error: scenario.fidelity: 'best'"));
   }
 }
 
