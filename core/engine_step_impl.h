@@ -343,7 +343,8 @@ Vec<double, D> Engine<D, P>::wall_repulsion(const Vec<Position, D>& x) const {
   const double reach = 0.25 * c_.spacing;
   const Vec<double, D> place = x.template cast<double>();
   for (const Wall& wall : walls_) {
-    const double inside = distance_inside<D>(wall, place);
+    // Around the stepped wall of a pipe fluid may lie right at the cylinder: only beyond it.
+    const double inside = distance_inside<D>(wall, place) + (wall.is_pipe() ? reach : 0.0);
     if (inside >= reach) continue;
     sum += (1 - inside / reach) * c_.sound_speed * c_.sound_speed / (10 * c_.spacing) *
            inward_normal<D>(wall, place);

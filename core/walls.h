@@ -127,12 +127,11 @@ template <int D = 2>
 std::vector<WallDummy<D>> wall_dummies(const Scenario& scenario, int layers);
 
 /// True if the site (i, k) of a lattice that is `count` spacings wide and deep lies within the
-/// circle that the square holds, widened by `beyond` spacings, and not less than dx/4 from its rim:
-/// nearer than that the wall would push it away. Whole numbers only: no rounding.
+/// circle that the square holds, widened by `beyond` spacings. Whole numbers only: no rounding.
 constexpr bool in_pipe(std::int64_t i, std::int64_t k, std::int64_t count,
                        std::int64_t beyond = 0) {
   const std::int64_t x = 2 * i + 1 - count, z = 2 * k + 1 - count, r = count + 2 * beyond;
-  return x * x + z * z <= r * r - r;
+  return x * x + z * z < r * r;
 }
 
 /// length / spacing, which must be whole to 1e-6; otherwise throws ModelError naming `key` and the
