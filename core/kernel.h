@@ -12,8 +12,8 @@
 // by a branch, so that pair loops vectorise.
 #pragma once
 
+#include "core/kernel_names.h"
 #include "core/math.h"
-#include "core/scenario.h"
 
 namespace varve::core {
 

@@ -12,7 +12,7 @@
 #include <cstdint>
 #include <string_view>
 
-#include "core/scenario.h"
+#include "core/kernel_names.h"
 #include "core/state.h"
 
 namespace varve::core {

@@ -8,6 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/kernel_names.h"
+
 namespace varve::core {
 
 enum class Precision { double_, float_, mixed };
@@ -22,7 +24,6 @@ enum class PressureForce { conjugate, averaged };
 enum class Porosity { kernel, conservative };
 enum class CouplingMode { two_way, one_way, off };
 enum class Drag { stokes, schiller_naumann, dallavalle_di_felice, gidaspow, cylinder };
-enum class Kernel { wendland_c2, cubic, quintic };
 enum class GrainMotion { free, frozen };
 enum class Shape { box, pipe };
 enum class InitialFlow { rest, uniform, shear, taylor_green };
