@@ -62,6 +62,7 @@ void add_genesis(const DiffReport& report, std::string& out) {
 
 void add_values(const FirstDifference& first, std::string& out) {
   if (!first.ulp) return;
+  out += fmt::format("{}, particle {}:\n", first.field, first.particle);
   out += fmt::format("  a = {}  ({})\n  b = {}  ({})\n", first.a, first.a_decimal, first.b,
                      first.b_decimal);
   if (first.absolute && first.relative)
@@ -200,9 +201,9 @@ std::string headline(const DiffReport& report) {
 std::string text_report(const DiffReport& report, bool quiet) {
   std::string out = headline(report) + "\n";
   if (quiet) return out;
-  if (report.first && report.verdict == Verdict::different) add_values(*report.first, out);
   if (!report.relation.empty()) out += report.relation + "\n";
   add_genesis(report, out);
+  if (report.first && report.verdict == Verdict::different) add_values(*report.first, out);
   if (report.first_bitwise)
     out += fmt::format("first difference of any size: {}\n", where(*report.first_bitwise));
   add_fields(report, out);

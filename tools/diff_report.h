@@ -78,9 +78,9 @@ struct DiffReport {
 /// "IDENTICAL ...", "DIFFER first at step ...", "WITHIN TOLERANCE ...", "NOT COMPARABLE ...".
 std::string headline(const DiffReport& report);
 
-/// Headline, genesis differences, counts per field, growth, notes. `bold_first`: headline in bold.
+/// Headline, genesis differences, both values, counts per field, growth, notes.
 std::string text_report(const DiffReport& report, bool quiet);
-/// One object; schema "varve.diff/1".
+/// One object; tools/schemas/diff.json describes it.
 std::string json_report(const DiffReport& report);
 /// A suite with one case per compared field and one for the comparison as a whole.
 std::string junit_report(const DiffReport& report, double seconds);

@@ -67,6 +67,7 @@ TEST(DiffReport, TheFirstLineNamesStepTimeFieldParticleBothValuesAndUlps) {
 TEST(DiffReport, TheTextHoldsInputsDecimalsAndCounts) {
   const std::string text = text_report(different(), false);
   EXPECT_THAT(text, HasSubstr("parameter contact.damping: a=0.2 b=0.25"));
+  EXPECT_LT(text.find("contact.damping"), text.find("  b = ")) << "inputs explain first";
   EXPECT_THAT(text, HasSubstr("b = 0x1.0000000000001p+0  (1.0000000000000002)"));
   EXPECT_THAT(text, HasSubstr("fluid.velocity: 3 of 100 values differ, 3 particles"));
 }
