@@ -54,7 +54,7 @@ std::vector<RestartScene> restart_scenes() {
   const std::string box = "[domain]\nwidth = 1.2 cm\nheight = 1.2 cm\n";
   const std::string water = "[fluid]\nviscosity = 0.02 Pa.s\nspacing = 1 mm\njitter = 0.05\n";
   const std::string record = "[record]\nkeyframe_steps = 64\n";
-  const std::string slosh = "top = free\n[gravity]\ntilt = 40 deg\n";
+  const std::string slosh = "top = free\n[gravity]\ntilt = 20 deg\n";
   const std::string pair =
       "[grains]\nrows = 1\ncolumns = 2\ngap = 0.01\nlowest_y = 1.3 mm\n"
       "velocity_y = -20 mm/s\nvelocity_x = 40 mm/s\n";
@@ -65,7 +65,7 @@ std::vector<RestartScene> restart_scenes() {
           {"free_surface", box + slosh + water + "level = 8 mm\nsound_speed = 4 m/s\n" + record,
            true, false},
           {"periodic", box + "sides = periodic\n" + water +
-                           "sound_speed = 1 m/s\nbody_force_x = 2\n" + pair + record,
+                           "sound_speed = 4 m/s\nbody_force_x = 2\n" + pair + record,
            true, true},
           {"fluid_only", box + water + "sound_speed = 1 m/s\nbody_force_x = 2\n" + record, true,
            false},
