@@ -15,6 +15,7 @@
 #include "core/fluid_lists.h"
 #include "core/geometry_change.h"
 #include "core/pair_sweeps.h"
+#include "core/parts.h"
 #include "core/simulation.h"
 #include "core/stage_digests.h"
 #include "core/state.h"
@@ -106,6 +107,10 @@ class Engine final : public Simulation {
   static void describe(const GeometryReport& report, std::vector<Happening>& happenings);
   static ChangeOptions scheduled_options(const ScheduledChange& scheduled);
   Vec<double, D> walls_on_fluid() const;
+  bool has_fluid() const { return with_fluid && scenario_.has_fluid(); }
+  bool has_grains() const { return with_grains && scenario_.has_grains(); }
+  bool coupled() const { return with_fluid && with_grains && c_.coupled; }
+  bool two_way() const { return with_fluid && with_grains && c_.two_way; }
   void count_pass(std::size_t pass) { ++counters_.passes[pass].second; }
 
   Scenario scenario_;

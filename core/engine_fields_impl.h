@@ -54,14 +54,14 @@ void Engine<D, P>::build_fields() {
   const std::string mass_unit = D == 2 ? "kg/m" : "kg";
   add("clock.step", "clock", FieldType::u64, 2, "");
   add("clock.time", "clock", FieldType::f64, 3, "s");
-  if (scenario_.has_fluid()) {
+  if (has_fluid()) {
     add("fluid.id", "fluid", FieldType::u64, 1, "", true, true);
     add("fluid.mass", "fluid", real, 1, mass_unit, false, true);
     add("fluid.position", "fluid", position, D, "m", false, false, "fluid.velocity");
     add("fluid.velocity", "fluid", real, D, "m/s");
     add("fluid.superficial_density", "fluid", real, 1, "kg/m3");
   }
-  if (!scenario_.has_grains()) return;
+  if (!has_grains()) return;
   add("grains.id", "grains", FieldType::u64, 1, "", true, true);
   add("grains.species", "grains", FieldType::u32, 1, "", false, true);
   add("grains.position", "grains", position, D, "m");
@@ -80,14 +80,14 @@ void Engine<D, P>::refresh_spans() {
   spans_.clear();
   spans_.push_back({1, std::as_bytes(std::span(step_numbers_))});
   spans_.push_back({1, std::as_bytes(std::span(step_times_))});
-  if (scenario_.has_fluid()) {
+  if (has_fluid()) {
     spans_.push_back(span_of(state_.fluid.id));
     spans_.push_back(span_of(state_.fluid.mass));
     spans_.push_back(span_of(state_.fluid.position));
     spans_.push_back(span_of(state_.fluid.velocity));
     spans_.push_back(span_of(state_.fluid.superficial_density));
   }
-  if (!scenario_.has_grains()) return;
+  if (!has_grains()) return;
   spans_.push_back(span_of(state_.grains.id));
   spans_.push_back(span_of(state_.grains.species));
   spans_.push_back(span_of(state_.grains.position));
@@ -121,14 +121,14 @@ void Engine<D, P>::set_state(std::span<const FieldSpan> values) {
   take_clock(numbers, 2);
   take_clock(times, 3);
   state.clock = {numbers[0], times[0], times[1], numbers[1], times[2]};
-  if (scenario_.has_fluid()) {
+  if (has_fluid()) {
     take(state.fluid.id);
     take(state.fluid.mass);
     take(state.fluid.position);
     take(state.fluid.velocity);
     take(state.fluid.superficial_density);
   }
-  if (scenario_.has_grains()) {
+  if (has_grains()) {
     take(state.grains.id);
     take(state.grains.species);
     take(state.grains.position);
@@ -172,7 +172,7 @@ void Engine<D, P>::check_counts(const State<D, P>& state) const {
 
 template <int D, class P>
 void Engine<D, P>::build_tables() {
-  if (scenario_.has_grains()) build_grain_tables();
+  if (has_grains()) build_grain_tables();
   has_stage_table_ = scenario_.record.stage_digests;
   if (has_stage_table_)
     tables_.push_back({"stages",
@@ -201,7 +201,7 @@ void Engine<D, P>::build_grain_tables() {
   for (const char* name : {"normal_loss", "tangential_loss", "friction_loss"})
     contacts.columns.push_back({name, FieldType::f64, "J"});
   tables_.push_back(std::move(contacts));
-  if (c_.coupled)
+  if (coupled())
     tables_.push_back({"work",
                        {{"drag_on_grains", FieldType::f64, "J"},
                         {"hydrodynamic_on_grains", FieldType::f64, "J"}}});
@@ -219,7 +219,7 @@ void Engine<D, P>::record_tables() {
   using engine_detail::append;
   for (auto& table : table_bytes_)
     for (auto& column : table) column.clear();
-  if (scenario_.has_grains()) record_grain_tables();
+  if (has_grains()) record_grain_tables();
   if (!has_stage_table_) return;
   auto& stages = table_bytes_.back();
   table_rows_.back() = stage_digests_.digests().size();
@@ -251,7 +251,7 @@ void Engine<D, P>::record_grain_tables() {
                                record.tangential_loss, record.friction_loss})
       append(columns[k++], value);
   }
-  if (!c_.coupled) return;
+  if (!coupled()) return;
   table_rows_[1] = 1;
   append(table_bytes_[1][0], drag_work_);
   append(table_bytes_[1][1], hydrodynamic_work_);

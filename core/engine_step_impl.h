@@ -48,18 +48,18 @@ template <int D, class P>
 void Engine<D, P>::advance() {
   happenings_.clear();
   stage_digests_.begin();
-  if (scenario_.has_fluid()) {
+  if (has_fluid()) {
     update_lists();
     digest_stage(Stage::neighbours);
-    if (c_.two_way) find_porosity();
+    if (two_way()) find_porosity();
     prepare_fluid();
     find_density_and_pressure();
     if (work_.wall_count > 0) find_wall_values();
     find_stresses();
   }
-  if (c_.coupled) find_grain_forces();
-  if (scenario_.has_grains()) move_grains();
-  if (scenario_.has_fluid()) move_fluid();
+  if (coupled()) find_grain_forces();
+  if (has_grains()) move_grains();
+  if (has_fluid()) move_fluid();
   commit();
   record_tables();
   refresh_spans();
@@ -70,7 +70,7 @@ template <int D, class P>
 void Engine<D, P>::update_lists() {
   const double skin = engine_detail::skin_ratio * c_.smoothing_length;
   bool stale = lists_.stale(state_.fluid.position, skin, workers_);
-  if (c_.coupled) stale = stale || coupling_.stale(c_, state_, skin);
+  if (coupled()) stale = stale || coupling_.stale(c_, state_, skin);
   if (options_.rebuild_seed != 0 &&
       random_bits(options_.rebuild_seed, state_.clock.step, 0) % 3 == 0)
     stale = true;
@@ -78,7 +78,7 @@ void Engine<D, P>::update_lists() {
   lists_.rebuild(state_.fluid.position,
                  std::span(work_.wall_position.data(), work_.wall_count), c_.support, skin,
                  c_.period, workers_);
-  if (c_.coupled)
+  if (coupled())
     coupling_.rebuild(c_, state_, walls_, skin, workers_);
   ++counters_.list_rebuilds;
   count_pass(engine_detail::pass_lists);
@@ -104,7 +104,7 @@ void Engine<D, P>::prepare_fluid() {
     for (std::size_t a = begin; a < end; ++a) {
       const Real rhob = state_.fluid.superficial_density[a];
       work_.volume_before[a] = state_.fluid.mass[a] / rhob;
-      work_.density_before[a] = c_.two_way ? rhob / work_.floored_porosity[a] : rhob;
+      work_.density_before[a] = two_way() ? rhob / work_.floored_porosity[a] : rhob;
     }
   });
 }
@@ -117,7 +117,7 @@ SweepData<D, P> Engine<D, P>::sweep_data() {
   s.velocity = reinterpret_cast<const Real*>(state_.fluid.velocity.data());
   s.mass = state_.fluid.mass.data();
   s.superficial_density = state_.fluid.superficial_density.data();
-  s.porosity = c_.two_way ? work_.floored_porosity.data() : nullptr;
+  s.porosity = two_way() ? work_.floored_porosity.data() : nullptr;
   s.volume_before = work_.volume_before.data();
   s.density_before = work_.density_before.data();
   s.fluid = lists_.fluid();
@@ -223,7 +223,7 @@ void Engine<D, P>::move_grains() {
   next_.contacts = state_.contacts;
   const std::size_t n = state_.grains.size();
   work_.outer.assign(n, {c_.grain_weight, Vec<double, D>::Zero(), 0});
-  if (c_.coupled)
+  if (coupled())
     for (std::size_t i = 0; i < n; ++i) {
       const GrainForce<D>& f = coupling_.grain_forces()[i];
       work_.outer[i] = {c_.grain_weight + f.hydrodynamic, f.fluid_velocity, f.coefficient};
@@ -236,7 +236,7 @@ void Engine<D, P>::move_grains() {
                     state_.clock.step + 1, next_.grains, next_.contacts);
   counters_.grain_substeps += static_cast<std::uint64_t>(c_.substeps);
   count_pass(engine_detail::pass_contacts);
-  if (c_.coupled) {
+  if (coupled()) {
     coupling_.set_drag(contacts_.mean_drag());
     sum_work();
   }
@@ -248,7 +248,7 @@ void Engine<D, P>::move_grains() {
 /// Frozen grains feel the fluid and give it back; nothing moves them.
 template <int D, class P>
 void Engine<D, P>::hold_grains() {
-  if (!c_.coupled) return;
+  if (!coupled()) return;
   std::vector<Vec<double, D>> drag(state_.grains.size());
   for (std::size_t i = 0; i < drag.size(); ++i)
     drag[i] = work_.outer[i].coefficient *
@@ -287,7 +287,7 @@ template <int D, class P>
 void Engine<D, P>::check_grains() const {
   // Without fluid there is no sound speed: a grain that crosses itself within a sub-step has
   // failed.
-  const double limit = scenario_.has_fluid()
+  const double limit = has_fluid()
                            ? scenario_.guards.speed * c_.sound_speed
                            : c_.diameter * static_cast<double>(c_.substeps) / c_.dt;
   const std::uint64_t step = state_.clock.step + 1;
@@ -318,7 +318,7 @@ std::size_t Engine<D, P>::move_fluid_part(std::size_t begin, std::size_t end) {
   std::size_t first_bad = engine_detail::nobody;
   for (std::size_t a = begin; a < end; ++a) {
     Vec<Real, D> force = work_.stress_force[a];
-    if (c_.two_way)
+    if (two_way())
       force += coupling_.reaction(a, static_cast<double>(work_.volume[a])).template cast<Real>();
     const Vec<double, D> repulsion = wall_repulsion(state_.fluid.position[a]);
     const Vec<Real, D> acceleration =
@@ -360,14 +360,14 @@ void Engine<D, P>::move_fluid() {
   });
   digest_stage(Stage::integration);
   count_pass(engine_detail::pass_fluid);
-  if (c_.two_way) count_pass(engine_detail::pass_reaction);
+  if (two_way()) count_pass(engine_detail::pass_reaction);
   const std::size_t first = *std::min_element(bad.begin(), bad.end());
   if (first != engine_detail::nobody) report_fluid(first);
 }
 
 template <int D, class P>
 double Engine<D, P>::density_deviation(std::size_t a) const {
-  const double eps = c_.two_way ? static_cast<double>(work_.floored_porosity[a]) : 1.0;
+  const double eps = two_way() ? static_cast<double>(work_.floored_porosity[a]) : 1.0;
   return static_cast<double>(next_.fluid.superficial_density[a]) / eps / c_.reference_density - 1;
 }
 
@@ -426,12 +426,12 @@ void Engine<D, P>::commit() {
   ClockState& clock = state_.clock;
   ++clock.step;
   clock.time = clock.since_time + static_cast<double>(clock.step - clock.since_step) * clock.dt;
-  if (scenario_.has_fluid()) {
+  if (has_fluid()) {
     std::swap(state_.fluid.position, next_.fluid.position);
     std::swap(state_.fluid.velocity, next_.fluid.velocity);
     std::swap(state_.fluid.superficial_density, next_.fluid.superficial_density);
   }
-  if (scenario_.has_grains()) {
+  if (has_grains()) {
     std::swap(state_.grains, next_.grains);
     std::swap(state_.contacts, next_.contacts);
   }

@@ -29,6 +29,9 @@ namespace {
 template <class Make>
 auto dispatch(const Scenario& scenario, Make&& make) {
   require_exact_arithmetic();
+  if ((scenario.has_fluid() && !with_fluid) || (scenario.has_grains() && !with_grains))
+    throw ModelError(std::string(with_fluid ? "grains.rows: grains" : "fluid.present: the fluid") +
+                     " were left out of this build of the engine");
   const auto with_precision = [&](auto dimension) {
     if (scenario.precision == Precision::float_) return make(dimension, FloatPrecision{});
     if (scenario.precision == Precision::mixed) return make(dimension, MixedPrecision{});
