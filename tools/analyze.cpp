@@ -1,0 +1,261 @@
+// varve analyze: observables of a recorded run, from its log alone.
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <map>
+#include <memory>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "io/log_reader.h"
+#include "tools/analysis.h"
+#include "tools/cli.h"
+#include "tools/simulation_engine.h"
+#include "tools/steps.h"
+
+namespace varve::tools {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// Files (or standard output) that tables go to. A table that can't be written whole is an error,
+/// never a shorter file that looks like one.
+class CsvFiles {
+ public:
+  CsvFiles(const std::string& where, const std::vector<const Observable*>& tables) {
+    if (tables.empty()) return;
+    if (tables.size() > 1 || std::filesystem::is_directory(where)) {
+      if (where == "-")
+        throw UsageError("--csv: standard output takes one observable; give a folder for several");
+      std::error_code failed;
+      std::filesystem::create_directories(where, failed);
+      if (failed)
+        throw UsageError(fmt::format("--csv: {}: {}", where, failed.message()));
+      for (const Observable* table : tables)
+        open(*table, (std::filesystem::path(where) / (table->name + ".csv")).string());
+      return;
+    }
+    if (where != "-") open(*tables.front(), where);
+  }
+
+  void row(const Observable& table, const std::vector<std::string>& cells) {
+    const std::string line = fmt::format("{}\n", fmt::join(cells, ","));
+    const auto found = files_.find(&table);
+    if (found == files_.end()) return print(line);
+    if (std::fwrite(line.data(), 1, line.size(), found->second.file.get()) != line.size())
+      fail(found->second);
+  }
+
+  void close() {
+    for (auto& [table, output] : files_) {
+      std::FILE* file = output.file.release();
+      if (std::fclose(file) != 0) fail(output);
+    }
+  }
+
+ private:
+  struct Closer {
+    void operator()(std::FILE* file) const { std::fclose(file); }
+  };
+  struct Output {
+    std::string path;
+    std::unique_ptr<std::FILE, Closer> file;
+  };
+  [[noreturn]] static void fail(const Output& output) {
+    throw ToolError(exit_output, fmt::format("{}: {}", output.path, std::strerror(errno)));
+  }
+  void open(const Observable& table, const std::string& path) {
+    std::FILE* file = std::fopen(path.c_str(), "wb");
+    if (!file) throw UsageError(fmt::format("--csv: {}: {}", path, std::strerror(errno)));
+    files_[&table] = {path, std::unique_ptr<std::FILE, Closer>(file)};
+  }
+  std::map<const Observable*, Output> files_;
+};
+
+void print_list(const core::Scenario& scenario) {
+  for (const Observable& each : observables()) {
+    print(fmt::format("{}\n  {}\n  formula  {}\n  source   {}\n  rows     {}\n  columns  {}\n",
+                      each.name, each.summary, each.formula, each.source,
+                      each.every_step ? "of every step in the range" : "of the steps asked for",
+                      fmt::join(each.columns(scenario), ", ")));
+  }
+}
+
+std::vector<const Observable*> tables_asked_for(const Invocation& invocation) {
+  std::vector<const Observable*> tables;
+  for (const std::string& list : invocation.values("observable")) {
+    const std::string padded = list + ",";
+    for (std::size_t begin = 0, comma; (comma = padded.find(',', begin)) != std::string::npos;
+         begin = comma + 1) {
+      const std::string name = padded.substr(begin, comma - begin);
+      if (name.empty()) continue;
+      if (name == "all")
+        for (const Observable& each : observables()) tables.push_back(&each);
+      else
+        tables.push_back(&find_observable(name));
+    }
+  }
+  return tables;
+}
+
+std::optional<std::pair<double, double>> window_asked_for(const Invocation& invocation) {
+  if (!invocation.has("window")) return std::nullopt;
+  const std::string text = invocation.value("window");
+  const std::size_t colon = text.find(':');
+  if (colon == std::string::npos)
+    throw UsageError(fmt::format("--window: expected FROM:TO in seconds, got '{}'", text));
+  const double from = parse_seconds(text.substr(0, colon), "--window");
+  const double to = parse_seconds(text.substr(colon + 1), "--window");
+  if (!(from < to))
+    throw UsageError(fmt::format("--window: expected FROM < TO, got '{}'", text));
+  return std::pair(from, to);
+}
+
+Json json_of(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
+
+Json json_of(const io::LogReader& log, const AnalysisSummary& s) {
+  Json out{{"schema", "varve.analyze/1"},
+           {"run", log.path()},
+           {"steps", {{"first", std::to_string(s.first_step)},
+                      {"last", std::to_string(s.last_step)},
+                      {"stride", std::to_string(s.stride)},
+                      {"states", std::to_string(s.states)}}},
+           {"time_s", {{"first", s.first_time}, {"last", s.last_time}}},
+           {"grains", s.grains}};
+  Json settling;
+  if (s.settling) {
+    const core::Window& w = *s.settling;
+    settling = {{"terminal_speed_m_s", w.mean},
+                {"deviation_m_s", w.deviation},
+                {"window_s", {w.from, w.to}},
+                {"window_rule", s.window_rule},
+                {"drift_m_s", w.drift},
+                {"stationary", w.stationary},
+                {"acceleration_time_s", json_of(s.acceleration_time)},
+                {"peak_speed_m_s", s.peak_speed},
+                {"peak_time_s", s.peak_time},
+                {"turning_points", s.turns.size()}};
+    settling["amplitude_m_s"] = s.oscillation ? Json(s.oscillation->amplitude) : Json();
+    settling["period_s"] = s.oscillation ? Json(s.oscillation->period) : Json();
+  }
+  out["settling"] = std::move(settling);
+  out["contacts"] = {{"first_s", json_of(s.first_contact)},
+                     {"first_floor_s", json_of(s.first_floor_contact)},
+                     {"between_grains", s.collisions},
+                     {"with_walls", s.wall_collisions},
+                     {"peak_force_N", s.peak_force},
+                     {"peak_force_time_s", s.peak_force_time},
+                     {"wall_hits", s.wall_hits},
+                     {"restitution", s.wall_hits > 0 ? Json(s.restitution.mean) : Json()},
+                     {"restitution_deviation", s.restitution.deviation},
+                     {"normal_loss_J", s.normal_loss},
+                     {"tangential_loss_J", s.tangential_loss},
+                     {"friction_loss_J", s.friction_loss}};
+  if (!(s.restitution.mean == s.restitution.mean)) out["contacts"]["restitution"] = Json();
+  out["rest_time_s"] = json_of(s.rest_time);
+  return out;
+}
+
+void print_summary(const io::LogReader& log, const AnalysisSummary& s) {
+  print(fmt::format("{}: steps {} to {}, t = {:.6g} to {:.6g} s, {} states, {} grains\n", log.path(),
+                    s.first_step, s.last_step, s.first_time, s.last_time, s.states, s.grains));
+  if (s.settling) {
+    const core::Window& w = *s.settling;
+    print(fmt::format("settling speed   {:.5g} m/s, deviation {:.2g}, {} (drift {:.2g} m/s)\n",
+                      w.mean, w.deviation, w.stationary ? "stationary" : "not stationary",
+                      w.drift));
+    print(fmt::format("  window         {:.5g} to {:.5g} s: {}\n", w.from, w.to, s.window_rule));
+    if (s.acceleration_time)
+      print(fmt::format("  95 % of it     after {:.5g} s\n", *s.acceleration_time));
+    print(fmt::format("  peak           {:.5g} m/s at {:.5g} s\n", s.peak_speed, s.peak_time));
+    if (s.oscillation)
+      print(fmt::format("  oscillation    {:.3g} m/s, period {:.3g} s ({} turns)\n",
+                        s.oscillation->amplitude, s.oscillation->period, s.turns.size()));
+  }
+  if (s.first_contact)
+    print(fmt::format("contacts         first at {:.5g} s{}, {} between grains, {} with walls\n",
+                      *s.first_contact,
+                      s.first_floor_contact
+                          ? fmt::format(", with the floor at {:.5g} s", *s.first_floor_contact)
+                          : std::string(),
+                      s.collisions, s.wall_collisions));
+  if (s.peak_force > 0)
+    print(fmt::format("  peak force     {:.4g} N at {:.5g} s\n", s.peak_force, s.peak_force_time));
+  if (s.restitution.mean == s.restitution.mean)
+    print(fmt::format("  restitution    {:.3g}, deviation {:.2g}, of {} hits of walls\n",
+                      s.restitution.mean, s.restitution.deviation, s.wall_hits));
+  if (s.first_contact)
+    print(fmt::format("  lost           {:.4g} J by normal damping, {:.4g} by tangential, {:.4g} by "
+                      "friction\n",
+                      s.normal_loss, s.tangential_loss, s.friction_loss));
+  if (s.rest_time)
+    print(fmt::format("at rest          from {:.5g} s (no grain faster than 1 mm/s)\n",
+                      *s.rest_time));
+}
+
+int run_analyze(const Invocation& invocation) {
+  const auto log = io::LogReader::open(invocation.arguments.front());
+  const core::Scenario scenario = scenario_of(log->genesis(), log->path());
+  if (invocation.has("list")) {
+    print_list(scenario);
+    return exit_ok;
+  }
+  AnalysisRequest request;
+  request.range = parse_range(invocation.value("range"), *log);
+  request.window = window_asked_for(invocation);
+  request.tables = tables_asked_for(invocation);
+  if (invocation.has("csv") && request.tables.empty())
+    throw UsageError("--csv needs --observable NAMES (or all); --list tells which there are");
+  const bool to_output = !request.tables.empty() && invocation.value("csv") == "-";
+  if (to_output && invocation.globals.json)
+    throw UsageError("--json and a table on standard output exclude each other; give --csv FILE");
+  CsvFiles files(invocation.value("csv"), request.tables);
+  const AnalysisSummary summary =
+      analyze(*log, scenario, request,
+              [&](const Observable& table, const std::vector<std::string>& row) {
+                files.row(table, row);
+              });
+  files.close();
+  if (invocation.globals.json)
+    print(json_of(*log, summary).dump(2) + "\n");
+  else if (!to_output)
+    print_summary(*log, summary);
+  return exit_ok;
+}
+
+Verb verb() {
+  Verb verb;
+  verb.name = "analyze";
+  verb.usage = "RUN";
+  verb.summary = "Observables of a recorded run: settling, contacts, porosity, energies.";
+  verb.description =
+      "Everything is computed from the log: decoded states and the contact records that the\n"
+      "engine wrote, nothing is executed again. Without --observable a summary is printed; with\n"
+      "it tables are written as CSV, units in the column names.\n\n"
+      "The terminal speed is the mean settling speed over the window: the second half of the time\n"
+      "to the first contact with the floor (or of the run), unless --window names another. It is\n"
+      "called stationary if a straight line through the window changes by at most 5 % of it.\n\n"
+      "  varve analyze column.varve\n"
+      "  varve analyze column.varve --observable settling > settling.csv\n"
+      "  varve analyze column.varve --observable all --csv tables --range 0::10\n"
+      "  varve analyze column.varve --list      what there is, with formula and source\n";
+  verb.options = {
+      {"observable", "NAMES", "tables to write, comma between; 'all' for every one", true, ""},
+      {"csv", "PATH", "file of the table, folder of several; - for standard output", false, "-"},
+      {"range", "A:B:S", "steps, each as in --at of the other verbs", false, "first:last"},
+      {"window", "FROM:TO", "times that the terminal speed is taken over", false, ""},
+      {"list", "", "names, columns, formulas and sources of the observables", false, ""},
+  };
+  verb.arguments_min = verb.arguments_max = 1;
+  verb.run = run_analyze;
+  return verb;
+}
+
+}  // namespace
+}  // namespace varve::tools
+
+int main(int argc, char** argv) {
+  return varve::tools::verb_main(argc, argv, varve::tools::verb());
+}
