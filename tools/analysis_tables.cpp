@@ -242,8 +242,8 @@ Observable wall_hits() {
 Observable energy() {
   return {"energy",
           "energies of grains and fluid, and what contacts and the fluid took",
-          "1/2 m v^2, 1/2 I w^2, -m g.x of grains (submerged in the excess form); 1/2 m v^2 of the fluid; losses and work summed "
-          "since the first step analyzed",
+          "1/2 m v^2, 1/2 I w^2, -m g.x of grains (submerged in the excess form); 1/2 m v^2 of the "
+          "fluid; losses and work summed since the first step analyzed",
           "definition; contact and work records",
           false,
           [](const core::Scenario&) {

@@ -159,8 +159,8 @@ Json json_of(const io::LogReader& log, const AnalysisSummary& s) {
 }
 
 void print_summary(const io::LogReader& log, const AnalysisSummary& s) {
-  print(fmt::format("{}: steps {} to {}, t = {:.6g} to {:.6g} s, {} states, {} grains\n", log.path(),
-                    s.first_step, s.last_step, s.first_time, s.last_time, s.states, s.grains));
+  print(fmt::format("{}: steps {} to {}, t = {:.6g} to {:.6g} s, {} states, {} grains\n",
+                    log.path(), s.first_step, s.last_step, s.first_time, s.last_time, s.states, s.grains));
   if (s.settling) {
     const core::Window& w = *s.settling;
     print(fmt::format("settling speed   {:.5g} m/s, deviation {:.2g}, {} (drift {:.2g} m/s)\n",
@@ -187,8 +187,8 @@ void print_summary(const io::LogReader& log, const AnalysisSummary& s) {
     print(fmt::format("  restitution    {:.3g}, deviation {:.2g}, of {} hits of walls\n",
                       s.restitution.mean, s.restitution.deviation, s.wall_hits));
   if (s.first_contact)
-    print(fmt::format("  lost           {:.4g} J by normal damping, {:.4g} by tangential, {:.4g} by "
-                      "friction\n",
+    print(fmt::format("  lost           {:.4g} J by normal damping, {:.4g} by tangential, {:.4g} "
+                      "by friction\n",
                       s.normal_loss, s.tangential_loss, s.friction_loss));
   if (s.rest_time)
     print(fmt::format("at rest          from {:.5g} s (no grain faster than 1 mm/s)\n",

@@ -34,7 +34,8 @@ TEST(ObserveSeries, QuartilesLieBetweenOrderStatistics) {
 
 TEST(ObserveSeries, FitOfFivePointsHasTheIntervalOfTheTables) {
   // x 1..5, y 2, 4, 5, 4, 5: slope 0.6, residual sum 2.4, s^2 = 0.8, t(3) = 3.182.
-  const auto fit = linear_fit(std::vector<double>{1, 2, 3, 4, 5}, std::vector<double>{2, 4, 5, 4, 5});
+  const std::vector<double> x{1, 2, 3, 4, 5}, y{2, 4, 5, 4, 5};
+  const auto fit = linear_fit(x, y);
   ASSERT_TRUE(fit);
   EXPECT_NEAR(fit->slope, 0.6, 1e-15);
   EXPECT_NEAR(fit->intercept, 2.2, 1e-14);
