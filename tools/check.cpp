@@ -1,5 +1,6 @@
 // varve check: what a scenario amounts to, before anything is run.
 #include <cmath>
+#include <optional>
 #include <string>
 
 #include <fmt/format.h>
@@ -8,7 +9,9 @@
 #include "core/assessment.h"
 #include "core/parameters.h"
 #include "tools/cli.h"
+#include "tools/probe.h"
 #include "tools/scenario_file.h"
+#include "tools/session.h"
 
 namespace varve::tools {
 namespace {
@@ -23,6 +26,14 @@ std::string bytes_text(double bytes) {
     ++unit;
   }
   return fmt::format("{:.3g} {}", bytes, units[unit]);
+}
+
+std::string probe_text(const Probe& probe) {
+  std::string text;
+  if (probe.predicted_bytes > 0) text = bytes_text(probe.predicted_bytes) + ", from ";
+  return text + fmt::format("{} steps in {:.2g} s: {} per step, {:.3g} B per particle-step",
+                            probe.steps, probe.wall_s, bytes_text(probe.bytes_per_step),
+                            probe.bytes_per_particle_step);
 }
 
 std::string log_size_text(const core::Assessment& a) {
@@ -66,7 +77,8 @@ std::string grains_text(const core::Scenario& s, const core::Assessment& a) {
   return text;
 }
 
-std::string report(const ScenarioSource& source, const core::Assessment& a) {
+std::string report(const ScenarioSource& source, const core::Assessment& a,
+                   const std::optional<Probe>& probe) {
   const core::Scenario& s = source.scenario;
   const char* per = s.domain.dimension == 2 ? "/m" : "";
   std::string text = fmt::format("{}: {}\n\nmodels\n", source.name,
@@ -97,7 +109,12 @@ std::string report(const ScenarioSource& source, const core::Assessment& a) {
     text += row("event " + change.name, fmt::format("after step {}", change.at_step));
   text += "\nlog\n";
   text += row("state", bytes_text(static_cast<double>(a.state_bytes)) + " uncompressed");
+  text += row("tier", s.record.tier == core::RecordTier::digests
+                          ? "digests"
+                          : s.record.every > 1 ? fmt::format("deltas every {}", s.record.every)
+                                               : "deltas");
   text += row("size", log_size_text(a));
+  if (probe) text += row("size by probe", probe_text(*probe));
   for (const core::Warning& warning : a.warnings)
     text += fmt::format("\nwarning: {}: {}", warning.key, warning.text);
   if (!a.warnings.empty()) text += '\n';
@@ -108,7 +125,8 @@ ordered_json number(double value) {
   return std::isfinite(value) ? ordered_json(value) : ordered_json(nullptr);
 }
 
-ordered_json json_report(const ScenarioSource& source, const core::Assessment& a) {
+ordered_json json_report(const ScenarioSource& source, const core::Assessment& a,
+                         const std::optional<Probe>& probe) {
   const core::Scenario& s = source.scenario;
   ordered_json object;
   object["schema"] = "varve-check-1";
@@ -145,6 +163,13 @@ ordered_json json_report(const ScenarioSource& source, const core::Assessment& a
   object["log_bytes"] = {{"state", std::to_string(a.state_bytes)},
                          {"low", fmt::format("{:.0f}", a.log_bytes_low)},
                          {"high", fmt::format("{:.0f}", a.log_bytes_high)}};
+  if (probe)
+    object["log_bytes"]["probe"] = {
+        {"steps", std::to_string(probe->steps)},
+        {"predicted", fmt::format("{:.0f}", probe->predicted_bytes)},
+        {"per_step", probe->bytes_per_step},
+        {"per_particle_step", probe->bytes_per_particle_step},
+        {"wall_s", probe->wall_s}};
   object["events"] = ordered_json::array();
   for (const core::ScheduledChange& change : s.changes) {
     ordered_json event{{"name", change.name}, {"at_step", std::to_string(change.at_step)}};
@@ -166,8 +191,15 @@ int run(const Invocation& invocation) {
     return exit_ok;
   }
   const core::Assessment assessment = core::assess(source.scenario);
-  print(invocation.globals.json ? json_report(source, assessment).dump(2) + "\n"
-                                : report(source, assessment));
+  std::optional<Probe> probe;
+  if (invocation.has("probe")) {
+    const std::uint64_t steps =
+        invocation.count("probe").value_or(default_probe_steps(source.scenario));
+    if (steps == 0) throw UsageError("--probe: expected at least 1 step, got 0");
+    probe = probe_log(source.scenario, assessment.steps, steps, {threads_option(invocation), 0});
+  }
+  print(invocation.globals.json ? json_report(source, assessment, probe).dump(2) + "\n"
+                                : report(source, assessment, probe));
   return exit_ok;
 }
 
@@ -186,14 +218,23 @@ int main(int argc, char** argv) {
       "All errors of a file are listed at once, with file:line:column; the exit code is then 3.\n"
       "FILE may also be the name of a preset (varve init --list).\n"
       "\n"
+      "--probe computes the run's first N steps, encodes them as a run would, writes nothing, and\n"
+      "takes the later half of them for typical: it costs what N steps of the run cost. Where a\n"
+      "scene changes its character later (a long fall before the first contact, a long rest),\n"
+      "give it more steps.\n"
+      "\n"
       "  varve check column.cfg\n"
       "  varve check column.cfg -s fluid.spacing=0.5mm -s contact.damping=0.3\n"
+      "  varve check column.cfg --probe         the log's size, to 20 % for the shipped scenes\n"
       "  varve check column.cfg --json | jq .dt_set_by\n"
       "  varve check column.cfg --resolved      every key, nothing left to derive\n";
   verb.options = {
       {"set,s", "KEY=VALUE", "set a key, over what the file says", true, ""},
       {"resolved", "", "print the resolved scenario instead; it reads back to the same bits", false,
        ""},
+      {"probe", "=N", "predict the log's size from N steps (default: two intervals between "
+                      "keyframes, at most 1024)", false, ""},
+      threads_spec(),
   };
   verb.arguments_min = 1;
   verb.arguments_max = 1;

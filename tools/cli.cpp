@@ -80,13 +80,19 @@ std::string wrapped(std::string_view text, std::size_t indent) {
   return out;
 }
 
+bool has_optional_value(const OptionSpec& option) { return option.value.starts_with('='); }
+
 std::string option_line(const OptionSpec& option) {
   constexpr std::size_t indent = 26;
   const std::size_t comma = option.name.find(',');
   std::string line = "  ";
   line += comma == std::string::npos ? "    " : fmt::format("-{}, ", option.name.substr(comma + 1));
   line += "--" + long_name(option);
-  if (!option.value.empty()) line += " " + option.value;
+  if (has_optional_value(option)) {
+    line += "[" + option.value + "]";
+  } else if (!option.value.empty()) {
+    line += " " + option.value;
+  }
   if (line.size() + 2 > indent) {
     line += '\n' + std::string(indent, ' ');
   } else {
@@ -124,6 +130,9 @@ po::options_description describe(const std::vector<OptionSpec>& options) {
   for (const OptionSpec& option : options) {
     if (option.value.empty()) {
       description.add_options()(option.name.c_str(), "");
+    } else if (has_optional_value(option)) {
+      description.add_options()(option.name.c_str(),
+                                po::value<std::vector<std::string>>()->implicit_value({}, ""), "");
     } else {
       description.add_options()(option.name.c_str(), po::value<std::vector<std::string>>(), "");
     }
@@ -222,6 +231,12 @@ Invocation parse(int argc, char** argv, const Verb& verb) {
     if (spec != options.end() && !spec->repeatable && invocation.has(item.string_key) &&
         !spec->value.empty())
       throw UsageError(fmt::format("option '--{}' was given twice", item.string_key));
+    if (spec != options.end() && has_optional_value(*spec) && item.original_tokens.size() > 1) {
+      // Only --name=VALUE is a value; what stands apart is an argument.
+      invocation.arguments.insert(invocation.arguments.end(), item.value.begin(), item.value.end());
+      invocation.given.emplace_back(item.string_key, std::vector<std::string>{});
+      continue;
+    }
     invocation.given.emplace_back(item.string_key, item.value);
   }
   return invocation;

@@ -52,7 +52,7 @@ struct Exit {
 
 struct OptionSpec {
   std::string name;         ///< "output,o" or "threads"
-  std::string value;        ///< "RUN", "N"; empty for a flag
+  std::string value;        ///< "RUN", "N"; empty for a flag; "=N": may be left out
   std::string help;
   bool repeatable = false;
   std::string fallback;     ///< default shown in help and used when not given
@@ -78,7 +78,8 @@ class Invocation {
   /// Value of an option (its fallback if not given); UsageError if there is neither.
   std::string value(std::string_view option) const;
   std::vector<std::string> values(std::string_view option) const;
-  /// A whole number >= 0 or a finite number; nothing if not given, UsageError if it is none.
+  /// A whole number >= 0 or a finite number; nothing if not given (or given without its value),
+  /// UsageError if it is none.
   std::optional<std::uint64_t> count(std::string_view option) const;
   std::optional<double> number(std::string_view option) const;
 
