@@ -1,6 +1,7 @@
 #include "io/codec_stage.h"
 
 #include <algorithm>
+#include <cstring>
 
 #include "io/codec_track.h"
 
@@ -52,15 +53,26 @@ StageBlock Stage::block(std::size_t first) const {
   return block;
 }
 
+// In 16 bits throughout, of which every machine has vectors: a shift beyond the largest level does
+// what one of that size does.
 void Stage::rebase_levels(int step, const std::array<std::int16_t, candidates>& shifts) {
-  for (std::size_t v = 0; v < values_; ++v) {
-    std::array<int, candidates> before;
+  constexpr std::size_t block = 512;
+  std::array<std::array<std::int16_t, block>, candidates> before;
+  for (std::size_t first = 0; first < values_; first += block) {
+    const std::size_t n = std::min(block, values_ - first);
     for (unsigned k = 0; k < candidates; ++k) {
-      before[k] = level_of(k)[v];
+      std::memcpy(before[k].data(), level_of(k) + first, n * sizeof(std::int16_t));
     }
     for (unsigned k = 0; k < candidates; ++k) {
-      const int level = before[inherited(k, step)] + shifts[k];
-      level_of(k)[v] = static_cast<std::uint16_t>(std::clamp(level, 0, level_max));
+      const auto shift =
+          static_cast<std::int16_t>(std::clamp<int>(shifts[k], -level_max, level_max));
+      const std::int16_t* const from = before[inherited(k, step)].data();
+      std::uint16_t* const to = level_of(k) + first;
+      for (std::size_t i = 0; i < n; ++i) {
+        const auto level = static_cast<std::int16_t>(from[i] + shift);
+        to[i] = static_cast<std::uint16_t>(
+            std::clamp(level, std::int16_t{0}, static_cast<std::int16_t>(level_max)));
+      }
     }
   }
 }
