@@ -160,7 +160,8 @@ Json json_of(const io::LogReader& log, const AnalysisSummary& s) {
 
 void print_summary(const io::LogReader& log, const AnalysisSummary& s) {
   print(fmt::format("{}: steps {} to {}, t = {:.6g} to {:.6g} s, {} states, {} grains\n",
-                    log.path(), s.first_step, s.last_step, s.first_time, s.last_time, s.states, s.grains));
+                    log.path(), s.first_step, s.last_step, s.first_time, s.last_time, s.states,
+                    s.grains));
   if (s.settling) {
     const core::Window& w = *s.settling;
     print(fmt::format("settling speed   {:.5g} m/s, deviation {:.2g}, {} (drift {:.2g} m/s)\n",
