@@ -47,6 +47,7 @@ class Engine final : public Simulation {
   FluidReport fluid_report() const override;
 
   void advance() override;
+  void evaluate() override;
   void set_state(std::span<const FieldSpan> values) override;
   void change(const std::vector<std::pair<std::string, std::string>>& settings,
               const ChangeOptions& options) override;
@@ -76,6 +77,8 @@ class Engine final : public Simulation {
   void adopt_scenario();  // constants, walls and lists from scenario_
   void build_walls();
   SweepData<D, P> sweep_data();
+
+  void find_forces();
 
   // The stages of a step, in order.
   void update_lists();

@@ -47,6 +47,24 @@ void require_finite(const Numbers& numbers, const char* field, std::uint64_t ste
 template <int D, class P>
 void Engine<D, P>::advance() {
   happenings_.clear();
+  find_forces();
+  if (has_grains()) move_grains();
+  if (has_fluid()) move_fluid();
+  commit();
+  record_tables();
+  refresh_spans();
+  apply_scheduled();
+}
+
+template <int D, class P>
+void Engine<D, P>::evaluate() {
+  find_forces();
+  // Drag is a mean over the sub-steps: the grains move, and are not committed.
+  if (has_grains()) move_grains();
+}
+
+template <int D, class P>
+void Engine<D, P>::find_forces() {
   stage_digests_.begin();
   if (has_fluid()) {
     update_lists();
@@ -58,12 +76,6 @@ void Engine<D, P>::advance() {
     find_stresses();
   }
   if (coupled()) find_grain_forces();
-  if (has_grains()) move_grains();
-  if (has_fluid()) move_fluid();
-  commit();
-  record_tables();
-  refresh_spans();
-  apply_scheduled();
 }
 
 template <int D, class P>

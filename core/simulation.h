@@ -161,6 +161,10 @@ class Simulation {
   /// One step; then the changes scheduled for its end. Throws NumericalFailure: the state is then
   /// that of the last good step, unchanged.
   virtual void advance() = 0;
+  /// Everything that advance() would find for the state as it stands, which stays: grain_reports()
+  /// and fluid_report() then say, bit for bit, what they say after that advance(). Throws as it
+  /// does.
+  virtual void evaluate() = 0;
   /// Replaces the state.
   virtual void set_state(std::span<const FieldSpan> values) = 0;
   /// Changes keys now, by the fork rules. Throws ModelError; the state is then unchanged.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <memory>
 #include <tuple>
 
 #include <fmt/format.h>
@@ -10,7 +11,9 @@
 #include "core/constants.h"
 #include "core/walls.h"
 #include "io/errors.h"
+#include "core/criteria.h"
 #include "tools/cli.h"
+#include "tools/simulation_engine.h"
 
 namespace varve::tools {
 namespace {
@@ -142,6 +145,11 @@ class Walk {
     now_.gravity.assign(3, 0.0);
     now_.down.assign(3, 0.0);
     now_.period.assign(3, 0.0);
+    now_.points = request.points;
+    now_.fluid.dimension = dimension;
+    now_.fluid.smoothing_length = core::smoothing_length(scenario);
+    now_.fluid.kernel = scenario.fluid.kernel;
+    for (const Observable* table : request.tables) needs_forces_ |= table->forces;
     if (dimension == 2)
       set_directions(core::constants_of<2>(scenario));
     else
@@ -177,6 +185,7 @@ class Walk {
     }
     for (std::size_t k = 0; k < 3; ++k)
       now_.down[k] = g2 > 0 ? now_.gravity[k] / std::sqrt(g2) : (k == 1 ? -1.0 : 0.0);
+    for (std::size_t k = 0; k < 3; ++k) now_.fluid.period[k] = now_.period[k];
     // In the excess form the fluid carries its share of a grain's weight before any motion.
     if (c.coupled && !c.full_pressure)
       for (double& each : now_.gravity)
@@ -186,6 +195,7 @@ class Walk {
   void take(const io::StepHeader& header, const io::Frame* frame) {
     now_.step = header.step;
     now_.time = header.time;
+    now_.dt = header.dt;
     const bool due = (header.step - request_.range.first) % request_.range.stride == 0;
     if (summary_.states == 0 && frame) summary_.first_step = header.step;
     if (frame)
@@ -248,11 +258,7 @@ class Walk {
     g.spin = spin_;
     g.radius = radius_;
     g.mass = mass_;
-    now_.fluid_kinetic = 0;
-    const std::vector<double> v = reals(schema_, frame, "fluid.velocity"),
-                              m = reals(schema_, frame, "fluid.mass");
-    for (std::size_t k = 0; k < v.size(); ++k)
-      now_.fluid_kinetic += 0.5 * m[k / g.dimension] * v[k] * v[k];
+    take_fluid(frame);
     AnalysisSummary& s = summary_;
     if (s.states == 0) s.first_time = now_.time;
     ++s.states;
@@ -266,6 +272,30 @@ class Walk {
       s.peak_speed = group.settling_speed;
       s.peak_time = now_.time;
     }
+  }
+
+  void take_fluid(const io::Frame& frame) {
+    fluid_position_ = reals(schema_, frame, "fluid.position");
+    fluid_velocity_ = reals(schema_, frame, "fluid.velocity");
+    fluid_volume_ = reals(schema_, frame, "fluid.mass");
+    const std::vector<double> rhob = reals(schema_, frame, "fluid.superficial_density");
+    now_.fluid_kinetic = 0;
+    for (std::size_t k = 0; k < fluid_velocity_.size(); ++k)
+      now_.fluid_kinetic += 0.5 * fluid_volume_[k / now_.fluid.dimension] * fluid_velocity_[k] *
+                            fluid_velocity_[k];
+    for (std::size_t a = 0; a < rhob.size(); ++a) fluid_volume_[a] /= rhob[a];
+    pressure_.clear();
+    if (needs_forces_) {
+      if (!engine_) engine_ = SimulationEngine::of_genesis(log_.genesis(), log_.path(), {});
+      engine_->restore(frame.view());
+      engine_->evaluate();
+      now_.forces = engine_->simulation().grain_reports();
+      pressure_ = engine_->simulation().fluid_report().pressure;
+    }
+    now_.fluid.position = fluid_position_;
+    now_.fluid.velocity = fluid_velocity_;
+    now_.fluid.volume = fluid_volume_;
+    now_.fluid.pressure = pressure_;
   }
 
   void summarize() {
@@ -320,6 +350,9 @@ class Walk {
   std::vector<double> restitutions_;
   std::vector<std::uint64_t> id_;
   std::vector<double> position_, velocity_, spin_, radius_, mass_;
+  std::vector<double> fluid_position_, fluid_velocity_, fluid_volume_, pressure_;
+  std::unique_ptr<SimulationEngine> engine_;
+  bool needs_forces_ = false;
 };
 
 }  // namespace

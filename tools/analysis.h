@@ -9,9 +9,11 @@
 #include <vector>
 
 #include "core/observe/contacts.h"
+#include "core/observe/fluid.h"
 #include "core/observe/grains.h"
 #include "core/observe/series.h"
 #include "core/scenario.h"
+#include "core/simulation.h"
 #include "io/log_reader.h"
 #include "tools/steps.h"
 
@@ -20,7 +22,7 @@ namespace varve::tools {
 /// What every observable is computed from at one step.
 struct ObservedStep {
   std::uint64_t step = 0;
-  double time = 0;  ///< [s]
+  double time = 0, dt = 0;  ///< [s]
   core::GrainView grains;
   std::vector<core::ContactRow> contacts;
   double drag_work = 0, hydrodynamic_work = 0;  ///< [J] on the grains in this step
@@ -29,6 +31,10 @@ struct ObservedStep {
   double normal_loss = 0, tangential_loss = 0, friction_loss = 0, total_drag_work = 0,
          total_hydrodynamic_work = 0;
   std::vector<core::WallHit> hits;  ///< that ended in this step
+  core::FluidPoints fluid;          ///< pressure only where forces were evaluated
+  /// Forces that act at this state, evaluated by the engine on it; filled where a table needs them.
+  std::vector<core::GrainReport> forces;
+  std::vector<double> points;       ///< of the request, for tables of the fluid
   std::vector<double> down;     ///< unit vector along gravity, three components
   std::vector<double> gravity;  ///< [m/s2] as grains feel it: submerged in the excess form
   std::vector<double> period;   ///< [m] 0 where not periodic
@@ -38,6 +44,8 @@ struct ObservedStep {
 struct Observable {
   std::string name, summary, formula, source;
   bool every_step = false;  ///< rows of steps between strides too (things that happen)
+  bool forces = false;      ///< needs the engine's forces at each state
+  bool points = false;      ///< needs the request's points
   std::function<std::vector<std::string>(const core::Scenario&)> columns;
   std::function<void(const core::Scenario&, const ObservedStep&,
                      const std::function<void(std::vector<std::string>)>& row)>
@@ -72,6 +80,7 @@ struct AnalysisRequest {
   StepRange range;
   std::vector<const Observable*> tables;
   std::optional<std::pair<double, double>> window;  ///< [s]
+  std::vector<double> points;  ///< [m] where the fluid is looked at, dimension components each
 };
 /// Where a table's rows go; called once per row, the header first.
 using RowSink = std::function<void(const Observable&, const std::vector<std::string>& row)>;

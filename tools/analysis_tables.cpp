@@ -1,11 +1,13 @@
 // The tables that `varve analyze` writes: columns with units, formula, source, and how a row is
 // made.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 
 #include <fmt/format.h>
 
+#include "core/observe/drag_numbers.h"
 #include "tools/analysis.h"
 #include "tools/cli.h"
 
@@ -46,6 +48,8 @@ Observable settling() {
           "deviation of x",
           "definition",
           false,
+          false,
+          false,
           [](const core::Scenario& s) {
             Row row{"step", "time_s", "settling_speed_m_s", "mean_speed_m_s", "max_speed_m_s"};
             add_axes(row, s, "mean_v", "_m_s");
@@ -73,6 +77,8 @@ Observable trajectories() {
           "every grain at every step",
           "positions, velocities and spin as recorded; row and column of the first array",
           "the log's state",
+          false,
+          false,
           false,
           [](const core::Scenario& s) {
             Row row{"step", "time_s", "grain", "row", "column"};
@@ -112,6 +118,8 @@ Observable by_label(const char* name, const char* what, bool rows) {
           fmt::format("mean of v along gravity over the grains that started in one {}", what),
           "definition",
           false,
+          false,
+          false,
           [what](const core::Scenario&) {
             return Row{"step", "time_s", what, "grains", "settling_speed_m_s", "mean_y_m"};
           },
@@ -146,6 +154,8 @@ Observable gaps() {
           "|x_i - x_j| - R_i - R_j, least over j; its mean, least and quartiles over i",
           "definition",
           false,
+          false,
+          false,
           [](const core::Scenario&) {
             return Row{"step",          "time_s",       "mean_gap_m",  "least_gap_m",
                        "lower_gap_m", "median_gap_m", "upper_gap_m"};
@@ -169,6 +179,8 @@ Observable porosity() {
           "middle: its middle half along each axis, grains counted by their centre",
           "definition",
           false,
+          false,
+          false,
           [](const core::Scenario&) {
             return Row{"step", "time_s", "porosity_box", "porosity_middle"};
           },
@@ -189,6 +201,8 @@ Observable contacts() {
           "within the step",
           "contact records",
           true,
+          false,
+          false,
           [](const core::Scenario& s) {
             Row row{"step",           "time_s",         "contacts",        "with_grains",
                     "with_walls",     "begun",          "ended",           "mean_force_N",
@@ -219,6 +233,8 @@ Observable wall_hits() {
           "normal separation speed over normal approach speed, within the sub-steps",
           "contact records",
           true,
+          false,
+          false,
           [](const core::Scenario&) {
             return Row{"step",          "time_s",          "grain",       "wall",
                        "begin_s",       "impact_speed_m_s", "rebound_speed_m_s",
@@ -246,6 +262,8 @@ Observable energy() {
           "fluid; losses and work summed since the first step analyzed",
           "definition; contact and work records",
           false,
+          false,
+          false,
           [](const core::Scenario&) {
             return Row{"step", "time_s", "grains_kinetic_J", "grains_rotation_J",
                        "grains_potential_J", "fluid_kinetic_J", "normal_loss_J",
@@ -265,12 +283,121 @@ Observable energy() {
           }};
 }
 
+/// Of the contacts of this step on each grain [N], means over the step that led to this state.
+std::map<std::uint64_t, std::array<double, 3>> contact_forces(const ObservedStep& now,
+                                                              double dt) {
+  std::map<std::uint64_t, std::array<double, 3>> forces;
+  if (!(dt > 0)) return forces;
+  for (const core::ContactRow& row : now.contacts)
+    for (std::size_t k = 0; k < 3; ++k) {
+      forces[row.grain][k] += row.impulse[k] / dt;
+      if (row.kind == 0) forces[row.partner][k] -= row.impulse[k] / dt;
+    }
+  return forces;
+}
+
+Observable forces() {
+  return {"forces",
+          "forces on every grain, slip, drag coefficient, shielding",
+          "hydrodynamic: V (-grad p + div tau), drag: mean of K (u - v) over the sub-steps, at "
+          "this state; contact: impulse over dt of the step that led here; Re = rho0 eps |u - v| d "
+          "/ mu; Cd = |drag| / (1/2 rho0 (eps |u - v|)^2 A); shielding: |drag| over that of a lone "
+          "grain at the same slip",
+          "the engine's force pass on the recorded state; contact records",
+          false,
+          true,
+          false,
+          [](const core::Scenario& s) {
+            Row row{"step", "time_s", "grain", "row", "column"};
+            add_axes(row, s, "hydrodynamic_", "_N");
+            add_axes(row, s, "drag_", "_N");
+            add_axes(row, s, "contact_", "_N");
+            add_axes(row, s, "weight_", "_N");
+            add_axes(row, s, "fluid_v", "_m_s");
+            row.insert(row.end(), {"slip_m_s", "reynolds", "drag_coefficient", "porosity",
+                                   "shielding"});
+            return row;
+          },
+          [](const core::Scenario& s, const ObservedStep& now, const Emit& emit) {
+            const std::size_t d = dimension_of(s);
+            const auto contact = contact_forces(now, now.dt);
+            for (std::size_t i = 0; i < now.forces.size(); ++i) {
+              const core::GrainReport& f = now.forces[i];
+              Row row = beginning(now);
+              const core::GrainLabel label = core::label_of(s, now.grains.id[i]);
+              row.push_back(number(now.grains.id[i]));
+              row.push_back(number(label.row));
+              row.push_back(number(label.column));
+              add_values(row, f.hydrodynamic.data(), d);
+              add_values(row, f.drag.data(), d);
+              const auto touching = contact.find(now.grains.id[i]);
+              const std::array<double, 3> none{};
+              add_values(row, touching == contact.end() ? none.data() : touching->second.data(),
+                         d);
+              double slip2 = 0, drag2 = 0;
+              for (std::size_t k = 0; k < d; ++k) {
+                row.push_back(number(now.grains.mass[i] * now.gravity[k]));
+                const double slip = f.fluid_velocity[k] - now.grains.velocity[i * d + k];
+                slip2 += slip * slip;
+                drag2 += f.drag[k] * f.drag[k];
+              }
+              add_values(row, f.fluid_velocity.data(), d);
+              const core::DragNumbers n =
+                  core::drag_numbers(s, 2 * now.grains.radius[i], std::sqrt(slip2), f.porosity,
+                                     std::sqrt(drag2));
+              for (const double each : {std::sqrt(slip2), n.reynolds, n.coefficient, f.porosity,
+                                        n.shielding})
+                row.push_back(number(each));
+              emit(std::move(row));
+            }
+          }};
+}
+
+Observable flow() {
+  return {"flow",
+          "velocity, vorticity and pressure of the fluid at points (--grid, --at-point)",
+          "sum_b V_b f_b W / S; curl of sum_b V_b (v_b - v) grad W / S; S = sum_b V_b W",
+          "kernel interpolation with the run's kernel; pressure by the engine's force pass",
+          false,
+          true,
+          true,
+          [](const core::Scenario& s) {
+            Row row{"step", "time_s"};
+            add_axes(row, s, "", "_m");
+            add_axes(row, s, "v", "_m_s");
+            if (dimension_of(s) == 2)
+              row.push_back("vorticity_1_s");
+            else
+              add_axes(row, s, "vorticity_", "_1_s");
+            row.insert(row.end(), {"pressure_Pa", "weight"});
+            return row;
+          },
+          [](const core::Scenario& s, const ObservedStep& now, const Emit& emit) {
+            const std::size_t d = dimension_of(s);
+            const std::vector<core::FluidAtPoint> values =
+                core::sample_fluid(now.fluid, now.points);
+            for (std::size_t p = 0; p < values.size(); ++p) {
+              Row row = beginning(now);
+              add_values(row, now.points.data() + p * d, d);
+              add_values(row, values[p].velocity.data(), d);
+              if (d == 2)
+                row.push_back(number(values[p].vorticity[2]));
+              else
+                add_values(row, values[p].vorticity.data(), 3);
+              row.push_back(number(values[p].pressure));
+              row.push_back(number(values[p].weight));
+              emit(std::move(row));
+            }
+          }};
+}
+
 }  // namespace
 
 const std::vector<Observable>& observables() {
   static const std::vector<Observable> all = {
       settling(),  trajectories(),  by_label("rows", "row", true),
-      by_label("columns", "column", false), gaps(), porosity(), contacts(), wall_hits(), energy()};
+      by_label("columns", "column", false), gaps(), porosity(), contacts(), wall_hits(), energy(),
+      forces(),    flow()};
   return all;
 }
 

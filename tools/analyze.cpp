@@ -1,5 +1,8 @@
 // varve analyze: observables of a recorded run, from its log alone.
+#include <algorithm>
 #include <cerrno>
+#include <charconv>
+#include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
@@ -113,6 +116,49 @@ std::optional<std::pair<double, double>> window_asked_for(const Invocation& invo
   return std::pair(from, to);
 }
 
+/// Points of --at-point, and the centres of --grid's cells.
+std::vector<double> points_asked_for(const Invocation& invocation,
+                                     const core::Scenario& scenario) {
+  const auto dimension = static_cast<std::size_t>(scenario.domain.dimension);
+  std::vector<double> points;
+  for (const std::string& text : invocation.values("at-point")) {
+    std::size_t found = 0, begin = 0;
+    for (;;) {
+      const std::size_t comma = text.find(',', begin);
+      const std::string part = text.substr(begin, comma - begin);
+      double value = 0;
+      const auto read = std::from_chars(part.data(), part.data() + part.size(), value);
+      if (part.empty() || read.ec != std::errc{} || read.ptr != part.data() + part.size() ||
+          !std::isfinite(value))
+        throw UsageError(
+            fmt::format("--at-point: '{}' in '{}' is no number of metres", part, text));
+      points.push_back(value);
+      ++found;
+      if (comma == std::string::npos) break;
+      begin = comma + 1;
+    }
+    if (found != dimension)
+      throw UsageError(fmt::format("--at-point: expected {} coordinates in metres, got '{}'",
+                                   dimension, text));
+  }
+  if (const auto spacing = invocation.number("grid")) {
+    if (!(*spacing > 0))
+      throw UsageError(fmt::format("--grid: expected a spacing > 0 in metres, got {}", *spacing));
+    const core::Domain& d = scenario.domain;
+    const double lower[] = {d.left, 0, 0};
+    const double upper[] = {d.left + d.width, d.height, d.depth};
+    double cells = 1;
+    for (std::size_t k = 0; k < dimension; ++k) cells *= (upper[k] - lower[k]) / *spacing;
+    if (cells > 1e7)
+      throw UsageError(fmt::format("--grid: {} m makes {:.2g} points; at most 1e7 are possible",
+                                   *spacing, cells));
+    const std::vector<double> grid = core::lattice_points(
+        dimension, std::span(lower, dimension), std::span(upper, dimension), *spacing);
+    points.insert(points.end(), grid.begin(), grid.end());
+  }
+  return points;
+}
+
 Json json_of(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
 
 Json json_of(const io::LogReader& log, const AnalysisSummary& s) {
@@ -207,6 +253,15 @@ int run_analyze(const Invocation& invocation) {
   request.range = parse_range(invocation.value("range"), *log);
   request.window = window_asked_for(invocation);
   request.tables = tables_asked_for(invocation);
+  request.points = points_asked_for(invocation, scenario);
+  const bool looks_at_points = std::any_of(request.tables.begin(), request.tables.end(),
+                                           [](const Observable* table) { return table->points; });
+  if (request.points.empty() && looks_at_points) {
+    // 'all' means all that can be had.
+    if (request.tables.size() == 1)
+      throw UsageError("--observable flow needs --grid SPACING or --at-point X,Y");
+    std::erase_if(request.tables, [](const Observable* table) { return table->points; });
+  }
   if (invocation.has("csv") && request.tables.empty())
     throw UsageError("--csv needs --observable NAMES (or all); --list tells which there are");
   const bool to_output = !request.tables.empty() && invocation.value("csv") == "-";
@@ -241,12 +296,15 @@ Verb verb() {
       "  varve analyze column.varve\n"
       "  varve analyze column.varve --observable settling > settling.csv\n"
       "  varve analyze column.varve --observable all --csv tables --range 0::10\n"
+      "  varve analyze column.varve --observable flow --grid 0.002 --range last\n"
       "  varve analyze column.varve --list      what there is, with formula and source\n";
   verb.options = {
       {"observable", "NAMES", "tables to write, comma between; 'all' for every one", true, ""},
       {"csv", "PATH", "file of the table, folder of several; - for standard output", false, "-"},
       {"range", "A:B:S", "steps, each as in --at of the other verbs", false, "first:last"},
       {"window", "FROM:TO", "times that the terminal speed is taken over", false, ""},
+      {"grid", "SPACING", "of the flow: points a lattice of this spacing [m] apart", false, ""},
+      {"at-point", "X,Y", "of the flow: this point [m]; may be repeated", true, ""},
       {"list", "", "names, columns, formulas and sources of the observables", false, ""},
   };
   verb.arguments_min = verb.arguments_max = 1;

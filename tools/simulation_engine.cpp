@@ -99,6 +99,10 @@ void SimulationEngine::take(std::unique_ptr<core::Simulation> simulation) {
   events_.clear();
 }
 
+void SimulationEngine::evaluate() {
+  translated([&] { return simulation_->evaluate(), 0; });
+}
+
 void SimulationEngine::take_happenings() {
   events_.clear();
   for (const core::Happening& happening : simulation_->happenings())

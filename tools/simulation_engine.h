@@ -41,6 +41,8 @@ class SimulationEngine : public io::Engine {
   void change(const std::vector<io::Setting>& settings, const core::ChangeOptions& options);
 
   const core::Simulation& simulation() const { return *simulation_; }
+  /// Forces at the restored state, for simulation()'s reports (core::Simulation::evaluate).
+  void evaluate();
 
  private:
   SimulationEngine(core::Scenario genesis_scenario, const core::RunOptions& options);

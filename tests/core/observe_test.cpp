@@ -5,6 +5,8 @@
 #include <gtest/gtest.h>
 
 #include "core/observe/contacts.h"
+#include "core/observe/drag_numbers.h"
+#include "core/observe/fluid.h"
 #include "core/observe/grains.h"
 #include "core/observe/series.h"
 
@@ -223,6 +225,80 @@ TEST(ObserveContacts, AContactThatWasOpenAtTheStartIsNoHit) {
   row.begin = true;
   row.impact_speed = 2;
   EXPECT_EQ(hits.take(0.2, std::vector{row}).size(), 1u);
+}
+
+// ---- fluid ----
+
+/// A lattice 1 mm apart, 20 x 20, with a linear velocity field and pressure.
+struct LinearFlow {
+  std::vector<double> x, v, volume, pressure;
+  LinearFlow() {
+    for (int j = 0; j < 20; ++j)
+      for (int i = 0; i < 20; ++i) {
+        const double at[] = {(i + 0.5) * 1e-3, (j + 0.5) * 1e-3};
+        x.insert(x.end(), {at[0], at[1]});
+        v.insert(v.end(), {3 * at[1], 5 * at[0]});  // curl 2
+        volume.push_back(1e-6);
+        pressure.push_back(100 + 1e4 * at[1]);
+      }
+  }
+  FluidPoints points() const {
+    return {2, x, v, volume, pressure, 1.5e-3, Kernel::wendland_c2, {0, 0, 0}};
+  }
+};
+
+TEST(ObserveFluid, ALinearFlowHasItsValuesAndItsCurl) {
+  const LinearFlow flow;
+  const std::vector<double> places{0.01, 0.01, 0.0103, 0.0088};
+  const std::vector<FluidAtPoint> values = sample_fluid(flow.points(), places);
+  ASSERT_EQ(values.size(), 2u);
+  for (std::size_t p = 0; p < 2; ++p) {
+    EXPECT_NEAR(values[p].weight, 1, 0.01);
+    EXPECT_NEAR(values[p].velocity[0], 3 * places[2 * p + 1], 2e-5);
+    EXPECT_NEAR(values[p].velocity[1], 5 * places[2 * p], 3e-5);
+    EXPECT_NEAR(values[p].pressure, 100 + 1e4 * places[2 * p + 1], 0.1);
+    EXPECT_NEAR(values[p].vorticity[2], 2, 0.05);
+    EXPECT_EQ(values[p].vorticity[0], 0);
+  }
+}
+
+TEST(ObserveFluid, OutsideThereIsNone) {
+  const LinearFlow flow;
+  const std::vector<FluidAtPoint> values =
+      sample_fluid(flow.points(), std::vector<double>{0.05, 0.05});
+  EXPECT_EQ(values.at(0).weight, 0);
+  EXPECT_EQ(values.at(0).velocity[0], 0);
+}
+
+TEST(ObserveFluid, OverAPeriodicSeamItIsTheSame) {
+  LinearFlow flow;
+  for (std::size_t a = 0; a < flow.volume.size(); ++a) flow.v[2 * a] = flow.v[2 * a + 1] = 0.3;
+  FluidPoints points = flow.points();
+  points.period = {0.02, 0.02, 0};
+  const auto values = sample_fluid(points, std::vector<double>{0.0, 0.01, 0.01, 0.01});
+  EXPECT_NEAR(values[0].weight, values[1].weight, 1e-12);
+  EXPECT_NEAR(values[0].velocity[0], 0.3, 1e-14);
+}
+
+TEST(ObserveFluid, LatticePointsAreCellCentres) {
+  const std::vector<double> lower{1, 0}, upper{2, 1};
+  EXPECT_THAT(lattice_points(2, lower, upper, 0.5),
+              ElementsAre(1.25, 0.25, 1.75, 0.25, 1.25, 0.75, 1.75, 0.75));
+}
+
+TEST(ObserveDrag, NumbersOfALoneSphereInStokesFlow) {
+  Scenario scenario;
+  scenario.domain.dimension = 3;
+  scenario.fluid.density = 1000;
+  scenario.fluid.viscosity = 1;
+  scenario.coupling.drag = Drag::stokes;
+  const double d = 1e-3, slip = 1e-2, drag = 3 * 3.14159265358979323846 * 1 * d * slip;
+  const DragNumbers numbers = drag_numbers(scenario, d, slip, 1, drag);
+  EXPECT_NEAR(numbers.reynolds, 0.01, 1e-15);
+  EXPECT_NEAR(numbers.coefficient, 24 / 0.01, 1e-9);
+  EXPECT_NEAR(numbers.shielding, 1, 1e-12);
+  EXPECT_NEAR(drag_numbers(scenario, d, slip, 1, 0.5 * drag).shielding, 0.5, 1e-12);
+  EXPECT_EQ(drag_numbers(scenario, d, 0, 1, 0).coefficient, 0);
 }
 
 }  // namespace

@@ -147,9 +147,39 @@ TEST_F(Analyze, WhatItCannotDoIsSaid) {
 TEST_F(Analyze, TheListNamesEveryColumnsFormulaAndSource) {
   const std::string list = verb(0, {"analyze", crowd_, "--list"}).output;
   for (const char* name : {"settling", "trajectories", "rows", "columns", "gaps", "porosity",
-                           "contacts", "wall_hits", "energy"})
+                           "contacts", "wall_hits", "energy", "forces", "flow"})
     EXPECT_THAT(list, HasSubstr(std::string(name) + "\n"));
   EXPECT_THAT(list, HasSubstr("settling_speed_m_s"));
+}
+
+TEST_F(Analyze, ForcesAreThoseThatMoveTheGrainNext) {
+  // Without contact m dv/dt = weight + hydrodynamic + drag, at every step to round-off.
+  const auto forces = table(disc_, "forces", "0:20"), moved = table(disc_, "trajectories", "0:21");
+  const double mass = 2000 * 0.25 * 3.14159265358979 * 2.5e-3 * 2.5e-3;
+  for (std::size_t n = 0; n < 20; ++n) {
+    const double force = std::stod(forces.at("weight_y_N")[n]) +
+                         std::stod(forces.at("hydrodynamic_y_N")[n]) +
+                         std::stod(forces.at("drag_y_N")[n]);
+    const double dt = std::stod(moved.at("time_s")[n + 1]) - std::stod(moved.at("time_s")[n]);
+    const double change = std::stod(moved.at("vy_m_s")[n + 1]) - std::stod(moved.at("vy_m_s")[n]);
+    EXPECT_NEAR(mass * change / dt, force, 1e-9 * std::abs(force)) << n;
+    EXPECT_GT(std::stod(forces.at("drag_coefficient")[n]), 1);
+  }
+}
+
+TEST_F(Analyze, TheFlowIsTakenAtPointsAndOnAGrid) {
+  const std::string last = "last";
+  const auto rows = columns_of(verb(0, {"analyze", disc_, "--observable", "flow", "--grid", "0.002",
+                                        "--at-point", "0.005,0.006", "--range", last})
+                                   .output);
+  ASSERT_EQ(rows.at("x_m").size(), 1u + 5 * 6);
+  EXPECT_EQ(std::stod(rows.at("y_m")[0]), 0.006);
+  for (const std::string& weight : rows.at("weight")) EXPECT_NEAR(std::stod(weight), 0.95, 0.2);
+  EXPECT_THAT(verb(2, {"analyze", disc_, "--observable", "flow"}).errors, HasSubstr("--grid"));
+  EXPECT_THAT(verb(2, {"analyze", disc_, "--observable", "flow", "--at-point", "1"}).errors,
+              HasSubstr("2 coordinates"));
+  EXPECT_THAT(verb(2, {"analyze", disc_, "--observable", "flow", "--grid", "-1"}).errors,
+              HasSubstr("> 0"));
 }
 
 }  // namespace
