@@ -289,12 +289,22 @@ void append_particle(const Move<D>& move, const Vec<double, D>& x, double excess
   state.fluid.superficial_density.push_back(f.density + excess_density);
 }
 
+/// Ids are never given twice, also not that of a particle which was removed: those of one step start
+/// at its number times 2^24, beyond what any step before it gave out.
+template <int D>
+std::uint64_t first_new_id(const DoubleState<D>& state) {
+  const std::uint64_t next = state.fluid.size() > 0 ? state.fluid.id.back() + 1 : 0;
+  constexpr std::uint64_t ids_per_step = std::uint64_t{1} << 24, steps_max = std::uint64_t{1} << 39;
+  const std::uint64_t step = state.clock.step;
+  return step < steps_max ? std::max(next, step * ids_per_step) : next;
+}
+
 template <int D>
 void append_columns(const Move<D>& move, const std::vector<Columns>& sides, double mean_excess,
                     DoubleState<D>& state) {
   const double dx = move.before.fluid.spacing;
   const Box<D> box = move.old_box();
-  std::uint64_t id = state.fluid.size() > 0 ? state.fluid.id.back() + 1 : 0;
+  std::uint64_t id = first_new_id<D>(state);
   std::int64_t rows = 0;
   const auto at = [dx](std::int64_t k) { return (static_cast<double>(k) + 0.5) * dx; };
   for (const Columns& side : sides) rows = std::max(rows, side.rows);

@@ -365,5 +365,24 @@ TEST(EngineWidth, UnderAFreeSurfaceTheLevelStays) {
   EXPECT_LT(highest, 0.022);
 }
 
+TEST(EngineWidth, NeverGivesAnIdTwice) {
+  Scenario scenario = single_disc();
+  scenario.grains.rows = 0;
+  const auto simulation = started(scenario);
+  std::vector<std::uint64_t> given = field<std::uint64_t>(*simulation, "fluid.id");
+  // Wider, narrower and wider again: the last columns are other particles than those that went.
+  for (const char* width : {"0.022", "0.02", "0.022", "0.018", "0.022"}) {
+    const std::vector<std::uint64_t> before = field<std::uint64_t>(*simulation, "fluid.id");
+    for (int n = 0; n < 3; ++n) simulation->advance();
+    simulation->change(Settings{{"domain.width", width}}, {});
+    for (const std::uint64_t id : field<std::uint64_t>(*simulation, "fluid.id")) {
+      if (std::binary_search(before.begin(), before.end(), id)) continue;
+      EXPECT_FALSE(std::binary_search(given.begin(), given.end(), id)) << id;
+      given.push_back(id);
+    }
+    ASSERT_TRUE(std::is_sorted(given.begin(), given.end()));
+  }
+}
+
 }  // namespace
 }  // namespace varve::core::test
