@@ -23,6 +23,8 @@ struct Limits {
   std::uint64_t components_max = 64;
   std::uint64_t lineage_depth_max = 10000;
   std::uint64_t index_steps_max = std::uint64_t{1} << 16;  ///< steps in one index record
+  /// A step's number: exact in the doubles of JSON, and far from where counting on wraps.
+  std::uint64_t step_max = std::uint64_t{1} << 53;
   std::uint64_t damage_max = 10000;  ///< places listed; further ones are counted by the last
 };
 

@@ -45,7 +45,7 @@ void IndexBuilder::add_step(std::uint64_t step, std::uint64_t offset, StoredStat
 }
 
 bool IndexBuilder::due() const {
-  return pending_.states.size() >= steps_due ||
+  return pending_.states.size() >= steps_due || pending_.events.size() >= events_due ||
          (!empty() && last_offset_ - pending_.first_offset >= bytes_due);
 }
 
@@ -119,7 +119,8 @@ LogAppender LogAppender::continuing(File& file, const LogId& id, const Limits& l
       rethrow_at(error, file.path(), record.offset);
     }
     if (record.header.kind == RecordKind::index) start.index_offset = record.offset;
-    if (record.header.kind == RecordKind::event) continue;
+    // An event or a gap is nothing without the step behind it.
+    if (record.header.kind == RecordKind::event || record.header.kind == RecordKind::gap) continue;
     start.offset = record.end();
     start.sequence = record.header.sequence + 1;
   }

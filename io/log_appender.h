@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "io/record_io.h"
+#include "io/schema_check.h"
 
 namespace varve::io {
 
@@ -18,9 +19,11 @@ std::vector<std::uint64_t> skip_distances(std::uint64_t ordinal);
 /// Gathers what the next index record will say.
 class IndexBuilder {
  public:
-  /// Steps and bytes after which an index record is due.
+  /// Steps, and bytes, after which an index record is due.
   static constexpr std::size_t steps_due = 512;
   static constexpr std::uint64_t bytes_due = std::uint64_t{64} << 20;
+  /// Events after which one is due, so that a step's own (step_events_max) still fit into it.
+  static constexpr std::size_t events_due = step_events_max(Limits{});
 
   /// True where `step` at `offset` continues the run of steps gathered so far.
   bool continues(std::uint64_t step, std::uint64_t offset) const;

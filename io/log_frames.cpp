@@ -119,19 +119,28 @@ void LogReaderImpl::for_each_header(std::uint64_t from, std::uint64_t to,
              [&visit](const StepHeader& header, const Frame*) { return visit(header); });
 }
 
+bool LogReaderImpl::read_event(std::uint64_t offset, Event& event) const {
+  Record record;
+  if (!source_.read(offset, file_end_, Check::message, record)) return false;
+  if (record.header.kind != RecordKind::event) return false;
+  try {
+    event = decode_event(record.message, record.header.step, source_.limits());
+  } catch (const LogError&) {
+    return false;  // its bytes hold and make no sense: as if not there
+  }
+  return true;
+}
+
 std::vector<Event> LogReaderImpl::events() const {
   std::vector<Event> out;
-  Record record;
   for (int attempt = 0; attempt < 2; ++attempt) {
     const std::vector<std::uint64_t> offsets = event_offsets();
     out.clear();
-    const bool whole = std::all_of(offsets.begin(), offsets.end(), [&](std::uint64_t offset) {
-      if (!source_.read(offset, file_end_, Check::message, record)) return false;
-      if (record.header.kind != RecordKind::event) return false;
-      out.push_back(decode_event(record.message, record.header.step, source_.limits()));
-      return true;
-    });
-    if (whole) break;
+    for (const std::uint64_t offset : offsets) {
+      Event event;
+      if (read_event(offset, event)) out.push_back(std::move(event));
+    }
+    if (out.size() == offsets.size()) break;
     found_damage();
   }
   return out;

@@ -36,7 +36,18 @@ LogReaderImpl::LogReaderImpl(std::string path, FileSystem& files, const Limits& 
   find_first();
   find_end();
   settle();
-  if (steps_seen_ == 0) throw LogError(ErrorKind::damaged, path_, "no step of it is whole", 0);
+  if (steps_seen_ == 0) refuse_without_step();
+}
+
+// The first place that does not hold says why, and where.
+void LogReaderImpl::refuse_without_step() {
+  RecordWalk walk(source_, genesis_end_, 1, file_end_, Check::body);
+  for (auto item = walk.next(); item != RecordWalk::Item::end; item = walk.next()) {
+    if (item != RecordWalk::Item::bad) continue;
+    throw LogError(walk.bad().kind, path_, "no step of it is whole: " + walk.bad().what,
+                   static_cast<std::int64_t>(walk.bad().from));
+  }
+  throw LogError(ErrorKind::damaged, path_, "no step of it is whole", 0);
 }
 
 StepMessage LogReaderImpl::step_message(const Record& record) const {
@@ -142,6 +153,7 @@ void LogReaderImpl::absorb(const Record& record) const {
     loose_events_.push_back(record.offset);
     return;
   }
+  if (kind == RecordKind::gap) return;  // so does a gap
   if (is_step(kind)) {
     const StepMessage message = step_message(record);
     last_ = header_of(record, message);
@@ -151,7 +163,7 @@ void LogReaderImpl::absorb(const Record& record) const {
                                                           : StoredState::none;
     if (!scan_) pending_.push_back({last_.step, record.offset, state});
   }
-  if (is_step(kind) || kind == RecordKind::gap) {
+  if (is_step(kind)) {
     pending_events_.insert(pending_events_.end(), loose_events_.begin(), loose_events_.end());
     loose_events_.clear();
   }

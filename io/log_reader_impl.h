@@ -49,6 +49,7 @@ class LogReaderImpl final : public LogReader {
  private:
   // Opening and following (log_reader.cpp).
   void find_first();
+  [[noreturn]] void refuse_without_step();
   void find_end();
   bool close_by_end_record(const RecordHeader& header, std::uint64_t offset);
   bool start_from_index(std::uint64_t index_offset);
@@ -66,6 +67,7 @@ class LogReaderImpl final : public LogReader {
   std::optional<StepEntry> keyframe_at_or_before(std::uint64_t step) const;
   std::uint64_t held_at_or_before(std::uint64_t step) const;
   std::vector<std::uint64_t> event_offsets() const;
+  bool read_event(std::uint64_t offset, Event& event) const;
   bool read_step(const StepEntry& entry, Record& record, StepMessage& message) const;
   void found_damage() const;
 

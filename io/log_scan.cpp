@@ -21,6 +21,18 @@ void LogScan::note(const Record& record) {
   stride_ *= 2;
 }
 
+// What a step's record stores; nothing where its message makes no sense: as if it were not there.
+std::optional<StoredState> LogScan::stored_in(const Record& record) const {
+  if (record.header.kind == RecordKind::keyframe) return StoredState::keyframe;
+  if (record.header.body_bytes == 0) return StoredState::none;
+  try {
+    const bool has_state = !decode_step(record.message, source_.limits()).fields.empty();
+    return has_state ? StoredState::delta : StoredState::none;
+  } catch (const LogError&) {
+    return std::nullopt;
+  }
+}
+
 LogScan::Reached LogScan::walk_to(std::uint64_t step) {
   auto from = std::upper_bound(
       anchors_.begin() + 1, anchors_.end(), step,
@@ -34,16 +46,12 @@ LogScan::Reached LogScan::walk_to(std::uint64_t step) {
     const Record& record = walk.record();
     if (!is_step(record.header.kind)) continue;
     if (record.header.step > step) break;
+    const auto state = stored_in(record);
+    if (!state) continue;
     out.intact = chain.add(record.header);
-    const bool keyframe = record.header.kind == RecordKind::keyframe;
-    const bool has_state = record.header.body_bytes > 0 &&
-                           !decode_step(record.message, source_.limits()).fields.empty();
-    const StoredState state = keyframe    ? StoredState::keyframe
-                              : has_state ? StoredState::delta
-                                          : StoredState::none;
-    out.last = {record.header.step, record.offset, state};
-    if (keyframe) out.keyframe = out.last;
-    if (has_state && out.intact) out.stored = record.header.step;
+    out.last = {record.header.step, record.offset, *state};
+    if (*state == StoredState::keyframe) out.keyframe = out.last;
+    if (*state != StoredState::none && out.intact) out.stored = record.header.step;
   }
   return out;
 }

@@ -39,6 +39,7 @@ class LogScan {
     std::optional<std::uint64_t> stored;
     bool intact = false;
   };
+  std::optional<StoredState> stored_in(const Record& record) const;
   Reached walk_to(std::uint64_t step);
 
   RecordSource& source_;

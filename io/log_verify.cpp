@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <optional>
+#include <utility>
+#include <vector>
 
 #include "io/digest.h"
 #include "io/errors.h"
@@ -69,6 +71,7 @@ class Verifier {
     damage(bad.from, std::move(what));
     any_bad_ = true;
     interrupted_ = true;
+    known_lost_ = true;
     out_.closed = false;
     open_damage(out_.damage.size() - 1);
     index_known_ = false;
@@ -111,6 +114,7 @@ class Verifier {
           decode_event(record.message, record.header.step, source_.limits());
           events_.push_back(record.offset);
           last_event_ = record.offset;
+          loose_steps_.push_back(record.header.step);
           break;
         case RecordKind::index: check_index(record); break;
         case RecordKind::end: check_end(record); break;
@@ -146,12 +150,17 @@ class Verifier {
       damage(record.offset, fmt::format("step {}: the chain does not hold", step));
     }
     chain_ = message.chain;
+    loose_gap_.reset();
     last_step_ = step;
     last_recorded_ = step;
     last_ = message;
     if (out_.steps++ == 0) first_step_ = step;
     const bool keyframe = record.header.kind == RecordKind::keyframe;
     const bool has_state = !message.fields.empty();
+    if (keyframe && !has_state) {
+      damage(record.offset, fmt::format("step {}: a keyframe without a state", step));
+    }
+    check_events(step);
     const bool decodable = deltas_.add(record.header);
     if (!has_state || decodable) close_damage(step);
     interrupted_ = false;
@@ -162,7 +171,23 @@ class Verifier {
       entries_.clear();  // nobody indexes this log: it must be scanned, which is no damage
       index_known_ = false;
     }
-    if (decode_ && has_state && decodable) check_state(record, message);
+    if (!has_state) return;
+    if (!decodable && !known_lost_) {
+      damage(record.offset, fmt::format("step {}: coded upon a state that is not there", step));
+      open_damage(out_.damage.size() - 1);
+      lost_from_ = step;
+    }
+    known_lost_ = !decodable;
+    if (decode_ && decodable) check_state(record, message);
+  }
+
+  // The events that stand before a step's record are its own.
+  void check_events(std::uint64_t step) {
+    for (const std::uint64_t of : std::exchange(loose_steps_, {})) {
+      if (of != step && !known_lost_) {
+        damage(last_event_, fmt::format("an event of step {} before step {}", of, step));
+      }
+    }
   }
 
   void check_state(const Record& record, const StepMessage& message) {
@@ -175,6 +200,7 @@ class Verifier {
     }
     damage(record.offset, std::move(what));
     deltas_.interrupt();
+    known_lost_ = true;
     open_damage(out_.damage.size() - 1);
     lost_from_ = record.header.step;
   }
@@ -192,6 +218,9 @@ class Verifier {
         wrong("names other offsets than those of its steps");
       }
       if (index.events != events_) wrong("does not name the events before it");
+    }
+    if (record.header.step != index.last_step()) {
+      wrong(fmt::format("its header says step {}", record.header.step));
     }
     check_skips(record, index, wrong);
     next_ordinal_ = index.ordinal + 1;
@@ -233,6 +262,14 @@ class Verifier {
 
   void check_end(const Record& record) {
     const EndMessage end = decode_end(record.message);
+    if (record.header.step != end.last_step) {
+      damage(record.offset, fmt::format("end record: its header says step {}, it names {}",
+                                        record.header.step, end.last_step));
+    }
+    if (!interrupted_ && (loose_gap_ || !std::exchange(loose_steps_, {}).empty())) {
+      damage(record.offset, "end record: behind an event or a gap without its step");
+    }
+    loose_gap_.reset();
     if (out_.steps == 0 || interrupted_) return;
     if (end.last_step != last_recorded_ || end.digest != last_.digest || end.chain != last_.chain) {
       damage(record.offset, "end record: does not name the step before it");
@@ -249,8 +286,13 @@ class Verifier {
     if (last_step_ && !interrupted_ && gap.from != *last_step_ + 1) {
       damage(record.offset, fmt::format("gap from step {} follows step {}", gap.from, *last_step_));
     }
-    if (!any) return;
-    last_step_ = gap.to;
+    if (record.header.step != gap.from) {
+      damage(record.offset, fmt::format("gap from step {}: its header says {}", gap.from,
+                                        record.header.step));
+    }
+    loose_gap_ = record.offset;
+    if (any) last_step_ = gap.to;
+    loose_steps_.clear();  // of steps that are lost
     chain_.reset();
     deltas_.interrupt();
   }
@@ -260,6 +302,10 @@ class Verifier {
     if (loose_event_ && !torn) {
       torn = true;
       list({static_cast<std::int64_t>(last_event_), "an event without its step"});
+    }
+    if (loose_gap_ && !torn) {
+      torn = true;
+      list({static_cast<std::int64_t>(*loose_gap_), "a gap without a step behind it"});
     }
     out_.completeness = found_damage_ ? Completeness::damaged
                         : torn        ? Completeness::torn
@@ -278,6 +324,7 @@ class Verifier {
 
   bool any_bad_ = false;
   bool interrupted_ = false;  // a bad stretch lies between the last step and here
+  bool known_lost_ = false;   // no state can be decoded before the next keyframe; it was said why
   std::optional<std::size_t> open_damage_;
   std::uint64_t lost_from_ = 0;
 
@@ -287,8 +334,10 @@ class Verifier {
   StepMessage last_;
   std::optional<Digest> chain_;  // before the next step; nothing behind a gap
   DeltaChain deltas_;
+  std::optional<std::uint64_t> loose_gap_;  // behind the last step: its offset
   bool loose_event_ = false;
   std::uint64_t last_event_ = 0;
+  std::vector<std::uint64_t> loose_steps_;  // of the events since the last step
 
   std::vector<StepEntry> entries_;  // since the last index record
   std::vector<std::uint64_t> events_;

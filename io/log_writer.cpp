@@ -128,6 +128,7 @@ class LogWriterImpl final : public LogWriter {
 
   void append(const FrameView& frame, std::span<const Event> events) override {
     check_frame(genesis_.schema, frame, path_, particles_max_, limits_);
+    check_events(events, frame.step, path_, limits_);
     std::unique_lock guard(mutex_);
     check_open();
     if (frame.step != last_appended_ + 1) {
@@ -315,6 +316,7 @@ std::unique_ptr<LogWriter> LogWriter::create(const std::string& path, const Gene
   check_genesis(genesis, ErrorKind::mismatch, path, limits);
   const std::uint64_t particles_max = declared_particles(first, limits);
   check_frame(genesis.schema, first, path, particles_max, limits);
+  check_events(events, first.step, path, limits);
   auto lock = lock_new_file(files, path, options.overwrite);
   Genesis own = genesis;
   if (own.log_id.empty()) own.log_id = to_text(random_log_id());

@@ -84,6 +84,10 @@ class Checked {
     count(value.size(), limits_.text_bytes_max, "text_bytes_max", what);
     return {reinterpret_cast<const char*>(value.begin()), value.size()};
   }
+  std::uint64_t step(std::uint64_t value, const char* what) const {
+    count(value, limits_.step_max, "step_max", what);
+    return value;
+  }
   const Limits& limits() const { return limits_; }
 
  private:
@@ -217,7 +221,7 @@ Lineage take(schema::Lineage::Reader in, const Checked& checked) {
   Lineage out;
   out.parent_run_id = checked.text(in.getParentRunId(), "the parent's run id");
   out.parent_name = checked.text(in.getParentName(), "the parent's name");
-  out.step = in.getStep();
+  out.step = checked.step(in.getStep(), "the fork's step");
   out.parent_digest = take(in.getParentDigest());
   out.parent_chain = take(in.getParentChain());
   out.chain_base = take(in.getChainBase());
@@ -424,7 +428,7 @@ IndexMessage decode_index(std::span<const std::byte> bytes, const Limits& limits
   parse<schema::Index>(bytes, "index", [&](schema::Index::Reader in) {
     const Checked checked(limits);
     out.ordinal = in.getOrdinal();
-    out.first_step = in.getFirstStep();
+    out.first_step = checked.step(in.getFirstStep(), "index");
     out.first_offset = in.getFirstOffset();
     const auto gaps = in.getGaps();
     checked.count(gaps.size(), limits.index_steps_max, "index_steps_max", "index");
@@ -483,9 +487,10 @@ Bytes encode(const GapMessage& message) {
 GapMessage decode_gap(std::span<const std::byte> bytes, const Limits& limits) {
   GapMessage out;
   parse<schema::Gap>(bytes, "gap", [&](schema::Gap::Reader in) {
-    out.from = in.getFrom();
-    out.to = in.getTo();
-    out.what = Checked(limits).text(in.getWhat(), "a gap's reason");
+    const Checked checked(limits);
+    out.from = checked.step(in.getFrom(), "a gap");
+    out.to = checked.step(in.getTo(), "a gap");
+    out.what = checked.text(in.getWhat(), "a gap's reason");
   });
   return out;
 }

@@ -112,6 +112,11 @@ bool RecordSource::check_header(std::uint64_t offset, std::uint64_t file_end,
                             header.body_bytes, limits_.body_bytes_max),
                 ErrorKind::limit);
   }
+  if (header.step > limits_.step_max) {
+    return fail(fmt::format("{} record: step {} exceeds step_max {}", kind, header.step,
+                            limits_.step_max),
+                ErrorKind::limit);
+  }
   if (header.durable_seq >= header.sequence && header.sequence > 0) {
     return fail(fmt::format("{} record: claims to have been durable before it was written", kind));
   }
@@ -275,17 +280,17 @@ RecordWalk::Item RecordWalk::next() {
   }
   if (offset_ >= file_end_) return Item::end;
   if (!source_.read(offset_, file_end_, check_, record_)) {
-    return resynchronise(source_.problem(), source_.cut_short());
+    return resynchronise(source_.problem(), source_.cut_short(), source_.problem_kind());
   }
   if (sequence_ == any_sequence || record_.header.sequence == sequence_) return accept();
   return resynchronise(fmt::format("{} record: sequence {} where {} is expected",
                                    name_of(record_.header.kind), record_.header.sequence,
                                    sequence_),
-                       false);
+                       false, ErrorKind::damaged);
 }
 
-RecordWalk::Item RecordWalk::resynchronise(std::string what, bool cut_short) {
-  bad_ = {offset_, file_end_, sequence_, std::move(what), true, cut_short, false};
+RecordWalk::Item RecordWalk::resynchronise(std::string what, bool cut_short, ErrorKind kind) {
+  bad_ = {offset_, file_end_, sequence_, std::move(what), true, cut_short, false, kind};
   std::uint64_t indexes = 0;  // damaged index records: their headers hold, the rest does not
   for (std::uint64_t at = source_.find_header(offset_, file_end_); at < file_end_;) {
     const bool whole = source_.read(at, file_end_, check_, record_);
@@ -324,10 +329,11 @@ std::uint64_t RecordAppender::add(RecordKind kind, std::uint64_t step,
   const auto at_most = [&](std::uint64_t value, std::uint64_t cap, const char* name) {
     if (value > cap) {
       throw LogError(ErrorKind::limit, file_->path(),
-                     fmt::format("{} record of step {}: {} bytes exceed {} {}", name_of(kind), step,
+                     fmt::format("{} record of step {}: {} exceeds {} {}", name_of(kind), step,
                                  value, name, cap));
     }
   };
+  at_most(step, limits_.step_max, "step_max");
   at_most(message.size(), limits_.message_bytes_max, "message_bytes_max");
   RecordHeader header;
   header.kind = kind;

@@ -86,6 +86,7 @@ struct BadStretch {
   bool to_end = false;                 ///< nothing whole follows
   bool cut_short = false;              ///< a record that reaches beyond the file's end
   bool only_index = false;             ///< what is lost is known to be index records
+  ErrorKind kind = ErrorKind::damaged; ///< limit where a cap was exceeded
 };
 
 /// Visits records in order of the file, resynchronising behind damage.
@@ -109,7 +110,7 @@ class RecordWalk {
 
  private:
   Item accept();
-  Item resynchronise(std::string what, bool cut_short);
+  Item resynchronise(std::string what, bool cut_short, ErrorKind kind);
   bool follows_itself(const Record& record);
 
   RecordSource& source_;

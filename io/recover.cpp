@@ -4,11 +4,15 @@
 
 #include <algorithm>
 #include <optional>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "io/errors.h"
 #include "io/file.h"
 #include "io/log_appender.h"
 #include "io/log_reader_impl.h"
+#include "io/step_encoder.h"
 
 namespace varve::io {
 
@@ -26,7 +30,8 @@ class Salvage {
         genesis_(std::move(genesis)),
         genesis_end_(genesis_end),
         input_end_(input.size()),
-        reader_(source, genesis_.genesis.schema, genesis_.particles_max) {}
+        reader_(source, genesis_.genesis.schema, genesis_.particles_max),
+        chain_(chain_before_first(genesis_.genesis)) {}
 
   Recovery run(File& output) {
     genesis_.genesis.log_id = to_text(random_log_id());
@@ -76,26 +81,81 @@ class Salvage {
 
   void write_gap() {
     if (!open_gap_) return;
+    // Events of lost steps stand before the gap.
+    const auto kept = std::stable_partition(
+        events_.begin(), events_.end(), [this](const auto& placed) {
+          const std::uint64_t step = placed.second.step;
+          return step >= open_gap_->first && step <= open_gap_->second;
+        });
+    for (auto at = events_.begin(); at != kept; ++at) log_->event(at->second);
+    events_.erase(events_.begin(), kept);
     log_->gap({open_gap_->first, open_gap_->second, what_});
     open_gap_.reset();
+  }
+
+  // The events that stand before a step's record are its own.
+  void write_events(std::uint64_t step) {
+    for (const auto& [offset, event] : events_) {
+      if (event.step == step) {
+        log_->event(event);
+      } else {
+        spoilt(offset, fmt::format("an event of step {} before step {}", event.step, step));
+      }
+    }
+    events_.clear();
+  }
+
+  // What `decode` makes of a record. Nothing where its bytes hold and make no sense: such a record
+  // is as good as lost.
+  template <typename Decode>
+  auto understood(const Record& record, Decode&& decode) -> std::optional<decltype(decode())> {
+    try {
+      return decode();
+    } catch (const LogError& error) {
+      spoilt(record.offset, error.what());
+      return std::nullopt;
+    }
+  }
+
+  void spoilt(std::uint64_t offset, std::string what) {
+    what_ = what;
+    lost_something_ = true;
+    if (out_.damage.size() < source_.limits().damage_max) {
+      out_.damage.push_back({static_cast<std::int64_t>(offset), std::move(what)});
+    }
+  }
+
+  void take_gap(const Record& record) {
+    const auto gap = understood(
+        record, [&] { return decode_gap(record.message, source_.limits()); });
+    deltas_.interrupt();
+    chain_.reset();
+    if (!gap || gap->from > gap->to) return;
+    if (last_step_ && gap->to <= *last_step_) {
+      spoilt(record.offset, fmt::format("gap to step {} follows step {}", gap->to, *last_step_));
+      return;
+    }
+    what_ = gap->what;
+    lose(last_step_ ? *last_step_ + 1 : gap->from, gap->to);
+    last_step_ = gap->to;
   }
 
   void take(const Record& record) {
     switch (record.header.kind) {
       case RecordKind::step:
       case RecordKind::keyframe: take_step(record); break;
-      case RecordKind::event:
-        log_->event(decode_event(record.message, record.header.step, source_.limits()));
-        break;
-      case RecordKind::gap: {
-        const GapMessage gap = decode_gap(record.message, source_.limits());
-        if (gap.from > gap.to) break;
-        what_ = gap.what;
-        lose(gap.from, gap.to);
-        last_step_ = gap.to;
-        deltas_.interrupt();
+      case RecordKind::event: {
+        const auto event = understood(record, [&] {
+          return decode_event(record.message, record.header.step, source_.limits());
+        });
+        if (event && events_.size() >= step_events_max(source_.limits())) {
+          spoilt(record.offset, "more events before a step than half of list_items_max");
+        } else if (event) {
+          events_.emplace_back(record.offset, *event);
+        }
         break;
       }
+      case RecordKind::gap: take_gap(record); break;
       case RecordKind::genesis:
       case RecordKind::index:
       case RecordKind::end: break;
@@ -104,31 +164,65 @@ class Salvage {
     log_->write();
   }
 
-  void take_step(const Record& record) {
+  // Notes the steps missing before `step`. False where it does not come after the one before.
+  bool comes_next(const Record& record) {
     const std::uint64_t step = record.header.step;
-    const StepMessage message = decode_step(record.message, source_.limits());
     if (!last_step_) {
       // Where a log begins is not in genesis, except for a fork.
-      const std::uint64_t first =
-          genesis_.genesis.lineage ? genesis_.genesis.lineage->step : expected_first_;
-      if (!out_.damage.empty() && step > first) lose(first, step - 1);
+      const std::uint64_t first = genesis_.genesis.lineage ? genesis_.genesis.lineage->step : 0;
+      if (!out_.damage.empty() && step > first) {
+        lose(first, step - 1);
+        chain_.reset();
+      }
+    } else if (step <= *last_step_) {
+      spoilt(record.offset, fmt::format("step {} follows step {}", step, *last_step_));
+      return false;
     } else if (step > *last_step_ + 1) {
       lose(*last_step_ + 1, step - 1);
+      chain_.reset();
     }
     last_step_ = step;
-    const bool decodable = deltas_.add(record.header) && decodes(record, message);
-    // Without the keyframe before it a delta is nothing; a digest alone stands by itself.
-    const bool digest_alone = message.fields.empty() && genesis_.genesis.tier == Tier::digests;
-    const bool keep = decodable || digest_alone;
+    return true;
+  }
+
+  bool chained(const Record& record, const StepMessage& message) {
+    if (!chain_ || chain_next(*chain_, message.digest) == message.chain) return true;
+    spoilt(record.offset, fmt::format("step {}: the chain does not hold", record.header.step));
+    deltas_.interrupt();
+    return false;
+  }
+
+  void take_step(const Record& record) {
+    const std::uint64_t step = record.header.step;
+    const auto message = understood(
+        record, [&] { return decode_step(record.message, source_.limits()); });
+    if (!comes_next(record)) {
+      deltas_.interrupt();
+      return;
+    }
+    bool keep = false;
+    if (message && record.header.kind == RecordKind::keyframe && message->fields.empty()) {
+      spoilt(record.offset, fmt::format("step {}: a keyframe without a state", step));
+    } else if (message && message->body_bytes() != record.header.body_bytes) {
+      spoilt(record.offset, fmt::format("step {}: its blobs are not its body", step));
+    } else if (message && chained(record, *message)) {
+      const bool decodable = deltas_.add(record.header) && decodes(record, *message);
+      // Without the keyframe before it a delta is nothing; a digest alone stands by itself.
+      keep = decodable || (message->fields.empty() && genesis_.genesis.tier == Tier::digests);
+    }
     if (!keep) {
+      deltas_.interrupt();
+      chain_.reset();
       lose(step, step);
       return;
     }
     write_gap();
+    write_events(step);
     const std::vector<std::byte> body = body_of(record);
     const std::span<const std::byte> blobs[] = {body};
-    log_->step(step, record.header.kind == RecordKind::keyframe, message,
+    log_->step(step, record.header.kind == RecordKind::keyframe, *message,
                body.empty() ? std::span<const std::span<const std::byte>>{} : blobs);
+    chain_ = message->chain;
     ++out_.steps_kept;
   }
 
@@ -161,15 +255,13 @@ class Salvage {
     if (out_.steps_kept == 0) {
       throw LogError(ErrorKind::damaged, input_.path(), "no step of it can be saved", 0);
     }
-    write_gap();
+    // What is lost behind the last step is told, not recorded: a continued run computes it again.
     log_->end();
     log_->write();
     log_->sync();
     out_.lossy = lost_something_ || !out_.lost.empty();
     return std::move(out_);
   }
-
-  static constexpr std::uint64_t expected_first_ = 0;
 
   const File& input_;
   RecordSource& source_;
@@ -181,9 +273,11 @@ class Salvage {
   std::uint64_t synced_ = 0;
   Recovery out_;
   DeltaChain deltas_;
-  std::optional<std::uint64_t> last_step_;
+  std::optional<std::uint64_t> last_step_;  // seen: kept, lost or named by a gap
+  std::optional<Digest> chain_;             // at the last step; nothing where it is not known
   std::optional<std::pair<std::uint64_t, std::uint64_t>> open_gap_;
   std::string what_;
+  std::vector<std::pair<std::uint64_t, Event>> events_;  // since the last step kept: offset, event
   bool lost_something_ = false;
 };
 

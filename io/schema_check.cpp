@@ -220,4 +220,19 @@ void check_ids(const Schema& schema, const FrameView& frame, const std::string& 
   }
 }
 
+void check_events(std::span<const Event> events, std::uint64_t step, const std::string& path,
+                  const Limits& limits) {
+  const Rules rules{ErrorKind::limit, path, limits};
+  rules.at_most(events.size(), step_events_max(limits), "half of list_items_max",
+                fmt::format("step {}: events", step));
+  for (const Event& event : events) {
+    const std::string what = fmt::format("step {}: event '{}'", step, event.kind.substr(0, 40));
+    rules.string(event.kind, what);
+    rules.pairs(event.items, what);
+    std::uint64_t bytes = event.kind.size();
+    for (const auto& [key, value] : event.items) bytes += key.size() + value.size() + 48;
+    rules.at_most(2 * bytes, limits.message_bytes_max, "message_bytes_max", what);
+  }
+}
+
 }  // namespace varve::io

@@ -2,6 +2,7 @@
 // read back.
 #pragma once
 
+#include <span>
 #include <string>
 
 #include "io/errors.h"
@@ -28,5 +29,13 @@ void check_ids(const Schema& schema, const FrameView& frame, const std::string& 
 
 /// Bytes of one row of a table.
 std::size_t row_bytes(const TableDescriptor& table);
+
+/// Events that one step can have: half of what an index record may name, so that the events of a
+/// step always fit into the next index record, whatever came before them.
+constexpr std::uint64_t step_events_max(const Limits& limits) { return limits.list_items_max / 2; }
+
+/// Throws LogError (limit) for events of a step that could not be read again.
+void check_events(std::span<const Event> events, std::uint64_t step, const std::string& path,
+                  const Limits& limits);
 
 }  // namespace varve::io

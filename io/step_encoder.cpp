@@ -24,14 +24,6 @@ StepEncoder::StepEncoder(const Genesis& genesis, std::string path, const Limits&
       chain_(chain ? *chain : chain_before_first(genesis)),
       encoder_(FrameEncoder::create(genesis.schema)) {}
 
-// Particles that came or went make a keyframe. What comes and goes all the time (a population
-// without constant fields, such as contacts) does not: the codec matches it by its ids.
-bool StepEncoder::particles_changed(const FrameView& frame) const {
-  for (std::size_t i = 0; i < schema_.fields.size(); ++i)
-    if (schema_.fields[i].constant && frame.fields[i].count != counts_[i]) return true;
-  return false;
-}
-
 // A constant field is only in keyframes, so a change of its count makes one. Populations without
 // such fields (contacts, say) come and go within deltas.
 bool StepEncoder::constants_changed(const FrameView& frame) const {

@@ -26,7 +26,6 @@ class StepEncoder {
 
  private:
   enum class Store { nothing, delta, keyframe };
-  bool particles_changed(const FrameView& frame) const;
   bool constants_changed(const FrameView& frame) const;
   Store choose(const FrameView& frame) const;
   bool store_fields(const FrameView& frame);

@@ -559,7 +559,7 @@ void random_case(std::uint64_t seed) {
 }
 
 TEST(Codec, ThousandsOfRandomCasesComeBackBitForBit) {
-  const std::uint64_t cases = std::getenv("VARVE_LONG_TESTS") != nullptr ? 20000 : 1000;
+  const std::uint64_t cases = std::getenv("VARVE_LONG") != nullptr ? 20000 : 1000;
   for (std::uint64_t seed = 1; seed <= cases; ++seed) {
     random_case(seed);
     if (HasFatalFailure()) {

@@ -151,19 +151,172 @@ TEST_F(LogLimits, LengthsBeyondTheFileAreRefused) {
   EXPECT_THAT(refusal(ErrorKind::limit, open), HasSubstr("body_bytes_max"));
 }
 
-TEST_F(LogLimits, CapsCanBeSet) {
+// ---- every cap, one by one ----
+
+struct Cap {
+  const char* name;
+  std::uint64_t Limits::*cap;
+  std::uint64_t value;  ///< below what the log needs
+  const char* said;     ///< what the message names, where it is not the name and the value
+};
+
+class LogCap : public LogLimits, public testing::WithParamInterface<Cap> {
+ protected:
+  void SetUp() override {
+    options_.beads = 3;
+    options_.steps = 20;
+    options_.keyframe_steps = 8;
+    options_.event_every = 6;
+    ToyRun run(options_);
+    io::Genesis genesis = toy_genesis(options_);
+    genesis.lineage.emplace();
+    genesis.lineage->parent_run_id = std::string(32, 'a');
+    genesis.lineage->ancestors.assign(3, std::string(32, 'a'));
+    const auto writer =
+        LogWriter::create("log", genesis, run.frame().view(), run.events(), untimed(files_));
+    while (run.frame().step < options_.steps) {
+      run.advance();
+      writer->append(run.frame().view(), run.events());
+    }
+    writer->close();
+    LogBytes bytes(files_, "log");  // damage in two places, for the cap on their number
+    if (GetParam().cap == &Limits::damage_max) {
+      for (const std::size_t nth : {2U, 9U})
+        bytes.set_byte(bytes.record(RecordKind::step, nth).end() - 30, 0x77);
+    }
+    bytes.put(files_, "log");
+  }
+
+  // All that a reader with these limits has to say of the log.
+  std::string everything(const Limits& limits) {
+    std::string said;
+    const auto listen = [&](auto&& what) {
+      try {
+        what();
+      } catch (const LogError& error) {
+        EXPECT_TRUE(error.kind() == ErrorKind::limit || error.kind() == ErrorKind::damaged);
+        EXPECT_EQ(error.path(), "log") << error.what();
+        EXPECT_GE(error.offset(), 0) << error.what();
+        said += std::string(error.what()) + "\n";
+      }
+    };
+    listen([&] {
+      const auto reader = LogReader::open("log", &files_, limits);
+      for (const auto& damage : reader->verify().damage) said += damage.what + "\n";
+      for (std::uint64_t step = 0; step <= options_.steps; ++step) {
+        listen([&] { reader->frame(step); });
+        listen([&] { reader->tables(step); });
+      }
+    });
+    return said;
+  }
+};
+
+TEST_P(LogCap, IsEnforcedAndNamed) {
+  if (GetParam().cap != &Limits::damage_max) {
+    EXPECT_EQ(everything({}), "") << "the log keeps the defaults";
+  }
   Limits limits;
-  limits.fields_max = 3;
-  EXPECT_THAT(refusal(ErrorKind::limit, [&] { LogReader::open("log", &files_, limits); }),
-              HasSubstr("fields_max 3"));
-  limits = {};
-  limits.particles_max = 100;
-  EXPECT_THAT(refusal(ErrorKind::limit, [&] { LogReader::open("log", &files_, limits); }),
-              HasSubstr("particles_max 100"));
-  limits = {};
-  limits.string_bytes_max = 4;
-  EXPECT_THAT(refusal(ErrorKind::limit, [&] { LogReader::open("log", &files_, limits); }),
-              HasSubstr("string_bytes_max 4"));
+  limits.*GetParam().cap = GetParam().value;
+  if (GetParam().cap == &Limits::ratio_max) limits.ratio_free_bytes = 16;
+  if (GetParam().cap == &Limits::ratio_free_bytes) limits.ratio_max = 1;
+  const std::string expected =
+      GetParam().said != nullptr
+          ? std::string(GetParam().said)
+          : std::string(GetParam().name) + " " + std::to_string(GetParam().value);
+  EXPECT_THAT(everything(limits), HasSubstr(expected));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, LogCap,
+    testing::Values(Cap{"message_bytes_max", &Limits::message_bytes_max, 64, nullptr},
+                    Cap{"body_bytes_max", &Limits::body_bytes_max, 16, nullptr},
+                    Cap{"field_bytes_max", &Limits::field_bytes_max, 40, nullptr},
+                    Cap{"ratio_max", &Limits::ratio_max, 1, "ratio_max 1:1"},
+                    Cap{"ratio_free_bytes", &Limits::ratio_free_bytes, 16, "ratio_max 1:1"},
+                    Cap{"particles_max", &Limits::particles_max, 100, nullptr},
+                    Cap{"rows_max", &Limits::rows_max, 1, nullptr},
+                    Cap{"string_bytes_max", &Limits::string_bytes_max, 4, nullptr},
+                    Cap{"text_bytes_max", &Limits::text_bytes_max, 4, nullptr},
+                    Cap{"list_items_max", &Limits::list_items_max, 1, nullptr},
+                    Cap{"fields_max", &Limits::fields_max, 3, nullptr},
+                    Cap{"tables_max", &Limits::tables_max, 0, nullptr},
+                    Cap{"columns_max", &Limits::columns_max, 1, nullptr},
+                    Cap{"components_max", &Limits::components_max, 1, nullptr},
+                    Cap{"lineage_depth_max", &Limits::lineage_depth_max, 2, nullptr},
+                    Cap{"index_steps_max", &Limits::index_steps_max, 4, nullptr},
+                    Cap{"step_max", &Limits::step_max, 11, nullptr},
+                    Cap{"damage_max", &Limits::damage_max, 1, nullptr}),
+    [](const auto& parameter) { return std::string(parameter.param.name); });
+
+TEST(Limits, AllHaveATestAbove) {
+  EXPECT_EQ(sizeof(Limits), 18 * sizeof(std::uint64_t)) << "a cap was added: test it too";
+}
+
+TEST_F(LogLimits, FailureInTheCodecNamesFileAndOffset) {
+  io::StepMessage message = last_message();
+  const PlacedRecord last = LogBytes(files_, "log").records().back();
+  const auto body = LogBytes(files_, "log").slice(last.end() - last.header.body_bytes, last.end());
+  message.fields[3].method = 77;
+  message.fields[3].order = 0;
+  replace_last(message, body);
+  const auto reader = LogReader::open("log", &files_);
+  try {
+    reader->frame(10);
+    FAIL() << "decoded";
+  } catch (const LogError& error) {
+    EXPECT_EQ(error.path(), "log");
+    EXPECT_EQ(error.offset(), static_cast<std::int64_t>(last.offset));
+    EXPECT_THAT(error.what(), HasSubstr("log: " + std::to_string(last.offset) + ": "));
+    EXPECT_THAT(error.what(), HasSubstr("bead.v"));
+    EXPECT_THAT(error.what(), HasSubstr("77"));
+  }
+}
+
+TEST_F(LogLimits, EventsThatCouldNotBeReadAgainAreRefusedAtOnce) {
+  ToyRun run(options_);
+  const auto writer =
+      LogWriter::create("new", toy_genesis(options_), run.frame().view(), {}, untimed(files_));
+  run.advance();
+  const auto append = [&](const std::vector<io::Event>& events) {
+    return refusal(ErrorKind::limit, [&] { writer->append(run.frame().view(), events); });
+  };
+  const std::string large(70000, 'x');
+  EXPECT_THAT(append({{1, large, {}}}), HasSubstr("string_bytes_max 65536"));
+  EXPECT_THAT(append({{1, "note", {{"text", large}}}}), HasSubstr("string_bytes_max 65536"));
+  std::vector<std::pair<std::string, std::string>> items(65537, {"k", "v"});
+  EXPECT_THAT(append({{1, "note", items}}), HasSubstr("list_items_max 65536"));
+  items.assign(1000, {"k", std::string(60000, 'x')});
+  EXPECT_THAT(append({{1, "note", items}}), HasSubstr("message_bytes_max"));
+  EXPECT_THAT(append(std::vector<io::Event>(32769, {1, "note", {}})),
+              HasSubstr("half of list_items_max 32768"));
+  // As many as a step can have, step after step: the index names them all.
+  for (int i = 0; i < 3; ++i) {
+    writer->append(run.frame().view(), std::vector<io::Event>(32768, {1, "note", {}}));
+    run.advance();
+  }
+  writer->close();
+  const auto reader = LogReader::open("new", &files_);
+  EXPECT_EQ(reader->events().size(), 3U * 32768U);
+  EXPECT_EQ(reader->verify().completeness, io::Completeness::complete);
+}
+
+TEST_F(LogLimits, StepsBeyondTheCapAreRefused) {
+  ToyOptions options = options_;
+  options.first_step = (std::uint64_t{1} << 53) - 1;
+  ToyRun run(options);
+  const auto writer =
+      LogWriter::create("new", toy_genesis(options), run.frame().view(), {}, untimed(files_));
+  run.advance();
+  writer->append(run.frame().view(), {});
+  run.advance();
+  EXPECT_THAT(refusal(ErrorKind::limit,
+                      [&] {
+                        writer->append(run.frame().view(), {});
+                        writer->close();
+                      }),
+              HasSubstr("step_max 9007199254740992"));
+  EXPECT_EQ(LogReader::open("new", &files_)->last_step(), options.first_step + 1);
 }
 
 TEST_F(LogLimits, WriterKeepsTheCapsThatReadersHave) {

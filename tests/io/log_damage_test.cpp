@@ -136,12 +136,13 @@ TEST_F(LogDamage, TruncationAtEveryByteKeepsExactlyTheWholeRecordsBeforeIt) {
   std::uint64_t opens = 0;
   std::optional<std::uint64_t> last_step;
   std::size_t counted = 0;        // records that end at or before the cut
-  std::uint64_t solid_end = 0;    // behind the last of them that is not a loose event
+  std::uint64_t solid_end = 0;    // behind the last of them that needs none after it
   for (std::uint64_t cut = 0; cut <= whole.size(); ++cut) {
     for (; counted < records.size() && records[counted].end() <= cut; ++counted) {
       const RecordKind kind = records[counted].header.kind;
       if (io::is_step(kind)) last_step = records[counted].header.step;
-      if (kind != RecordKind::event) solid_end = records[counted].end();
+      const bool waits = kind == RecordKind::event || kind == RecordKind::gap;  // for its step
+      if (!waits) solid_end = records[counted].end();
     }
     LogBytes(whole).truncate(cut).put(files_, "log");
     if (!last_step) {
@@ -193,8 +194,11 @@ TEST_F(LogDamage, TornLogIsCutOnReopenAndEndsEqualToAnUnkilledOne) {
 }
 
 TEST_F(LogDamage, EverySingleBitFlipIsDetected) {
-  const LogBytes whole = all_kinds(small(long_form() ? 400 : 12));
+  const LogBytes whole = all_kinds(small(long_form() ? 700 : 12));
   const std::uint64_t bits = 8 * whole.size();
+  if (long_form()) {
+    ASSERT_GE(whole.size(), 256U << 10);
+  }
   RecordProperty("bits", static_cast<int>(bits));
   for (std::uint64_t bit = 0; bit < bits; ++bit) {
     LogBytes(whole).flip_bit(bit).put(files_, "log");
@@ -492,6 +496,44 @@ TEST_F(LogDamage, StateThatDoesNotGiveItsDigestIsRefused) {
     EXPECT_THAT(error.what(), HasSubstr("digest"));
     EXPECT_EQ(error.offset(), static_cast<std::int64_t>(record.offset));
   }
+}
+
+TEST_F(LogDamage, RecordsThatContradictEachOtherAreNamed) {
+  write_toy_log("whole", small(), untimed(files_));
+  const LogBytes whole(files_, "whole");
+  const auto with_header = [&](RecordKind kind, auto&& edit) {
+    const PlacedRecord record = whole.record(kind);
+    io::RecordHeader header = record.header;
+    edit(header);
+    LogBytes(whole).set_header(record.offset, header).put(files_, "log");
+    const auto verification = LogReader::open("log", &files_)->verify();
+    EXPECT_EQ(verification.completeness, Completeness::damaged);
+    return verification.damage.empty() ? std::string() : verification.damage[0].what;
+  };
+  const auto later = [](io::RecordHeader& header) { ++header.step; };
+  EXPECT_THAT(with_header(RecordKind::event, later), HasSubstr("an event of step 1 before step 0"));
+  EXPECT_THAT(with_header(RecordKind::index, later), HasSubstr("its header says step 21"));
+  EXPECT_THAT(with_header(RecordKind::end, later), HasSubstr("its header says step 21"));
+  EXPECT_THAT(with_header(RecordKind::keyframe,
+                          [](io::RecordHeader& header) { header.kind = RecordKind::step; }),
+              HasSubstr("coded upon a state that is not there"));
+}
+
+TEST_F(LogDamage, FileThatChangesIntoAnotherLogIsNotBelieved) {
+  // Records of a run of the same shape, spliced in: every checksum holds, log id and sequence fit.
+  ToyOptions options = small();
+  write_toy_log("one", options, untimed(files_), false);
+  options.seed = 2;
+  write_toy_log("two", options, untimed(files_), false);
+  const LogBytes one(files_, "one"), two(files_, "two");
+  const auto ours = one.records(), theirs = two.records();
+  const std::size_t from = 12;
+  ASSERT_EQ(ours[from].header.step, theirs[from].header.step);
+  LogBytes(one).truncate(ours[from].offset)
+      .append(two.slice(theirs[from].offset, two.size())).put(files_, "log");
+  const auto verification = LogReader::open("log", &files_)->verify();
+  EXPECT_EQ(verification.completeness, Completeness::damaged);
+  EXPECT_THAT(verification.damage.at(0).what, HasSubstr("the chain does not hold"));
 }
 
 // Whatever stands in a record, with checksums that hold: an answer or a LogError, never a crash.

@@ -150,6 +150,63 @@ TEST_F(LogRecover, BytesInsertedOrMissingShiftNothingElse) {
   EXPECT_EQ(recover().lost.size(), 1U);
 }
 
+TEST_F(LogRecover, StepWhoseChainDoesNotHoldIsLostAndTheRestSaved) {
+  LogBytes bytes = write();
+  const PlacedRecord record = bytes.record(RecordKind::step, 9);
+  ASSERT_EQ(record.header.step, 11U);
+  const std::uint64_t chain_at = record.offset + io::header_bytes + 8 + 32;
+  bytes.set_byte(chain_at, 0x77).fix_checksums(record.offset).put(files_, "log");
+  EXPECT_EQ(LogReader::open("log", &files_)->verify().completeness, Completeness::damaged);
+  const auto recovery = recover();
+  EXPECT_TRUE(recovery.lossy);
+  EXPECT_EQ(recovery.lost, (Ranges{{11, 15}}));
+  EXPECT_THAT(recovery.damage.at(0).what, testing::HasSubstr("the chain does not hold"));
+}
+
+TEST_F(LogRecover, RecordsThatHoldAndMakeNoSenseAreLostAlone) {
+  const LogBytes whole = write();
+  for (const RecordKind kind : {RecordKind::event, RecordKind::step, RecordKind::index}) {
+    LogBytes bytes(whole);
+    const PlacedRecord record = bytes.record(kind, kind == RecordKind::step ? 9 : 0);
+    // The root pointer of the message: a list where a struct is expected.
+    bytes.set_byte(record.offset + io::header_bytes, 0x05).fix_checksums(record.offset)
+        .put(files_, "log");
+    const auto recovery = recover();
+    EXPECT_EQ(recovery.lossy, kind != RecordKind::index) << io::name_of(kind);
+    EXPECT_EQ(recovery.lost, kind == RecordKind::step ? (Ranges{{11, 15}}) : Ranges{});
+  }
+}
+
+TEST_F(LogRecover, StepThatComesAgainIsKeptOnce) {
+  LogBytes bytes = write();
+  const PlacedRecord record = bytes.record(RecordKind::step, 9);
+  io::RecordHeader header = record.header;
+  header.step = 3;
+  bytes.set_header(record.offset, header).put(files_, "log");
+  EXPECT_EQ(recover().lost, (Ranges{{11, 15}}));
+}
+
+TEST_F(LogRecover, LogWhoseEndWasLostIsSavedAndContinued) {
+  LogBytes bytes = write();
+  const PlacedRecord record = bytes.record(RecordKind::step, 30);
+  ASSERT_GT(record.header.step, 32U);
+  bytes.fill(record.offset, bytes.record(RecordKind::end).offset, 0x5c).put(files_, "log");
+  const auto recovery = recover();
+  EXPECT_TRUE(recovery.lossy);
+  const std::uint64_t last = LogReader::open("out", &files_)->last_step();
+  EXPECT_EQ(last, record.header.step - 1);
+  ToyRun run(options_);
+  while (run.frame().step < last) run.advance();
+  const auto writer = LogWriter::reopen("out", run.frame().view(), untimed(files_));
+  while (run.frame().step < options_.steps) {
+    run.advance();
+    writer->append(run.frame().view(), run.events());
+  }
+  writer->close();
+  EXPECT_EQ(LogReader::open("out", &files_)->verify().completeness, Completeness::complete);
+  EXPECT_TRUE(same_frame(*LogReader::open("out", &files_)->frame(40), run.frame()));
+}
+
 TEST_F(LogRecover, DigestsThatStandAloneAreKept) {
   options_.tier = io::Tier::digests;
   LogBytes bytes = write();
