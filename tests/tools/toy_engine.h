@@ -12,9 +12,9 @@
 
 namespace varve::testing {
 
-/// Explicit heat conduction along a rod of cells. A cell is added at the cold end every 40 steps and
-/// one removed at the hot end every 50 (the count varies, and an id is no index), every 64 there is
-/// a remark, and cells hotter than 1 at a step's end are listed in a table.
+/// Explicit heat conduction along a rod of cells. A cell is added at the cold end every 40 steps
+/// and one removed at the hot end every 50 (the count varies, and an id is no index), every 64
+/// there is a remark, and cells hotter than 1 at a step's end are listed in a table.
 class HeatRod : public io::Engine {
  public:
   explicit HeatRod(double conductivity = 0.2, std::size_t cells = 24)
