@@ -345,21 +345,20 @@ std::size_t Engine<D, P>::move_fluid_part(std::size_t begin, std::size_t end) {
   return first_bad;
 }
 
-/// Acceleration [m/s2] of fluid nearer than dx/4 to a wall, or beyond it: c0^2/(10 dx) at the wall,
-/// linear. Dummies alone hold fluid back by its pressure, and where that is not above the mean,
-/// between a grain and a wall, particles creep through: diffusion evens out the density that would
-/// stop them. At the wall this stops 0.16 c0, at the guard's dx beyond it 0.79 c0.
+/// Acceleration [m/s2] of fluid beyond a wall, back: 0.4 (c0/dx)^2 times its distance, which stops
+/// 0.6 c0 before the guard's dx. Dummies alone hold fluid back by its pressure, and where that is
+/// not above the mean, between a grain and a wall, particles creep through: diffusion evens out the
+/// density that would stop them. Pushing before the wall is reached would disturb the flow along
+/// it.
 template <int D, class P>
 Vec<double, D> Engine<D, P>::wall_repulsion(const Vec<Position, D>& x) const {
   Vec<double, D> sum = Vec<double, D>::Zero();
-  const double reach = 0.25 * c_.spacing;
   const Vec<double, D> place = x.template cast<double>();
   for (const Wall& wall : walls_) {
-    // Around the stepped wall of a pipe fluid may lie right at the cylinder: only beyond it.
-    const double inside = distance_inside<D>(wall, place) + (wall.is_pipe() ? reach : 0.0);
-    if (inside >= reach) continue;
-    sum += (1 - inside / reach) * c_.sound_speed * c_.sound_speed / (10 * c_.spacing) *
-           inward_normal<D>(wall, place);
+    const double inside = distance_inside<D>(wall, place);
+    if (inside >= 0) continue;
+    const double rate = c_.sound_speed / c_.spacing;
+    sum -= 0.4 * rate * rate * inside * inward_normal<D>(wall, place);
   }
   return sum;
 }

@@ -289,8 +289,8 @@ void append_particle(const Move<D>& move, const Vec<double, D>& x, double excess
   state.fluid.superficial_density.push_back(f.density + excess_density);
 }
 
-/// Ids are never given twice, also not that of a particle which was removed: those of one step start
-/// at its number times 2^24, beyond what any step before it gave out.
+/// Ids are never given twice, also not that of a particle which was removed: those of one step
+/// start at its number times 2^24, beyond what any step before it gave out.
 template <int D>
 std::uint64_t first_new_id(const DoubleState<D>& state) {
   const std::uint64_t next = state.fluid.size() > 0 ? state.fluid.id.back() + 1 : 0;

@@ -42,9 +42,9 @@ struct GeometryReport {
 /// Wider: columns of new fluid at old wall +- (k + 1/2) dx, at rest, from the bottom to the top
 /// (under a free surface: to the surface beside the wall), m = eps rho0 dx^D with eps from the
 /// grains; excess pressure = the fluid's mean, with full pressure on top of the hydrostatic one,
-/// and just hydrostatic below a free surface. Ids start at the step's number times 2^24 (or after the
-/// highest present one), so that none is ever given twice, row by row from the bottom, each row from
-/// the left.
+/// and just hydrostatic below a free surface. Ids start at the step's number times 2^24 (or after
+/// the highest present one), so that none is ever given twice, row by row from the bottom, each row
+/// from the left.
 ///
 /// Narrower: a grain that reaches more than 1 % d beyond a new wall is outside. `error` throws;
 /// `push` sets it against the wall, its velocity kept, and throws if it then overlaps another grain

@@ -9,7 +9,8 @@ set(varve_package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/varve)
 
 # The interfaces. A header that is not here is a detail of its library.
 set(varve_public_headers
-  core/assessment.h core/criteria.h core/parameters.h core/scenario.h core/simulation.h core/units.h
+  core/assessment.h core/criteria.h core/kernel_names.h core/parameters.h core/scenario.h
+  core/simulation.h core/units.h
   io/digest.h io/engine.h io/errors.h io/file.h io/frame.h io/frame_diff.h io/genesis.h io/limits.h
   io/log_reader.h io/log_writer.h io/memory_file.h io/ulp.h
   tools/cli.h tools/recording.h tools/steps.h)
