@@ -7,13 +7,27 @@ include(CMakePackageConfigHelpers)
 set(varve_include_dir ${CMAKE_INSTALL_INCLUDEDIR}/varve)
 set(varve_package_dir ${CMAKE_INSTALL_LIBDIR}/cmake/varve)
 
-# The interfaces. A header that is not here is a detail of its library.
+# The interfaces; other headers are details of their libraries.
 set(varve_public_headers
   core/assessment.h core/criteria.h core/kernel_names.h core/parameters.h core/scenario.h
   core/simulation.h core/units.h
   io/digest.h io/engine.h io/errors.h io/file.h io/frame.h io/frame_diff.h io/genesis.h io/limits.h
   io/log_reader.h io/log_writer.h io/memory_file.h io/ulp.h
   tools/cli.h tools/recording.h tools/steps.h)
+# What they include of ours goes with them.
+set(open ${varve_public_headers})
+while(open)
+  list(POP_FRONT open header)
+  file(STRINGS ${PROJECT_SOURCE_DIR}/${header} lines REGEX "^#include \"(core|io|tools)/")
+  foreach(line IN LISTS lines)
+    string(REGEX REPLACE "^#include \"([^\"]+)\".*" "\\1" included "${line}")
+    if(NOT included IN_LIST varve_public_headers)
+      list(APPEND varve_public_headers ${included})
+      list(APPEND open ${included})
+    endif()
+  endforeach()
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/${header})
+endwhile()
 foreach(header IN LISTS varve_public_headers)
   get_filename_component(folder ${header} DIRECTORY)
   install(FILES ${PROJECT_SOURCE_DIR}/${header} DESTINATION ${varve_include_dir}/${folder}
