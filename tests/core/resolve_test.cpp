@@ -342,5 +342,95 @@ TEST(ResolveEvents, ThatMakeNoSense) {
               HasSubstr("event.a.grains.rows: cannot change in a fork or an event: number, size"));
 }
 
+// ---- shapes of the domain ----
+
+/// The disc's box as one of spheres.
+Scenario sphere() {
+  Scenario s = disc();
+  s.domain.dimension = 3;
+  s.domain.depth = 0.01;
+  return s;
+}
+
+TEST(Resolve, ASolidDomainNeedsItsDepth) {
+  const Scenario s = resolved(sphere());
+  EXPECT_EQ(s.grains.centre_z, 0.005);
+  EXPECT_EQ(s.coupling.porosity_floor, 0.25);
+  EXPECT_EQ(s.contact.tangential_ratio, 2.0 / 7.0);
+  EXPECT_EQ(fluid_lattice(s).particles, 20 * 60 * 10);
+  Scenario without = sphere();
+  without.domain.depth = automatic;
+  EXPECT_THAT(problems_of(without), HasSubstr("domain.depth: missing"));
+  Scenario uneven = sphere();
+  uneven.domain.depth = 0.0104;
+  EXPECT_THAT(problems_of(uneven), HasSubstr("domain.depth: 0.0104 m is not a whole number"));
+}
+
+TEST(Resolve, WhatOnlySpaceHasIsRefusedInThePlane) {
+  Scenario s = disc();
+  s.domain.shape = Shape::pipe;
+  s.domain.depth = 0.01;
+  s.domain.faces = Boundary::periodic;
+  s.fluid.body_force_z = 1;
+  s.grains.layers = 2;
+  s.grains.centre_z = 0;
+  s.grains.velocity_z = 1;
+  const std::string text = problems_of(s);
+  for (const char* key : {"domain.shape", "domain.depth", "domain.faces", "fluid.body_force_z",
+                          "grains.layers", "grains.centre_z", "grains.velocity_z"})
+    EXPECT_THAT(text, HasSubstr(std::string(key) + ": has no meaning in 2D"));
+}
+
+TEST(Resolve, APipeIsRoundAndHoldsItsGrains) {
+  Scenario s = sphere();
+  s.domain.shape = Shape::pipe;
+  s.domain.width = 0.012;
+  s.grains.centre_x = automatic;
+  EXPECT_THAT(problems_of(s), HasSubstr("domain.depth: 0.01 m: a pipe is as deep as it is wide"));
+  s.domain.depth = automatic;
+  EXPECT_EQ(resolved(s).domain.depth, 0.012);
+  EXPECT_EQ(fluid_lattice(resolved(s)).particles, 112 * 60);
+  Scenario square = s;  // its corners are outside, though each side would fit
+  square.grains.columns = square.grains.layers = 4;
+  EXPECT_THAT(problems_of(square), HasSubstr("from the pipe's axis; its radius is 0.006 m"));
+  Scenario open = s;
+  open.domain.sides = Boundary::periodic;
+  EXPECT_THAT(problems_of(open), HasSubstr("domain.sides: the side of a pipe is a wall"));
+}
+
+TEST(Resolve, AWallMovesOnlyWhereItHolds) {
+  Scenario s = disc();
+  s.domain.lid_speed = 0.3;
+  EXPECT_GE(resolved(s).fluid.sound_speed, 3.0);
+  s.domain.top = Boundary::free_slip;
+  EXPECT_THAT(problems_of(s), HasSubstr("domain.lid_speed: 0.3 m/s moves nothing"));
+}
+
+TEST(Resolve, FlowsAtTheStartNeedSidesThatFitThem) {
+  Scenario s = disc();
+  s.grains.rows = 0;
+  s.fluid.initial = InitialFlow::taylor_green;
+  s.fluid.initial_speed = 0.1;
+  EXPECT_THAT(problems_of(s), HasSubstr("domain.sides: fluid.initial = taylor_green"));
+  s.domain.sides = s.domain.bottom = s.domain.top = Boundary::periodic;
+  // The taller the box the faster its vortices rise: 10 x 0.1 m/s x 6 / 2.
+  EXPECT_NEAR(resolved(s).fluid.sound_speed, 3.0, 1e-12);
+  s.fluid.initial = InitialFlow::shear;
+  EXPECT_THAT(problems_of(s), HasSubstr("fluid.initial: 'shear' jumps"));
+}
+
+TEST(Resolve, AColumnOfFluidHasAFreeSurface) {
+  Scenario s = disc();
+  s.grains.rows = 0;
+  s.fluid.width = 0.01;
+  EXPECT_EQ(resolved(s).fluid.pressure, PressureForm::full);
+  EXPECT_EQ(fluid_lattice(resolved(s)).particles, 10 * 60);
+  s.fluid.width = 0.02;  // all of it is no column
+  EXPECT_TRUE(std::isnan(resolved(s).fluid.width));
+  EXPECT_EQ(resolved(s).fluid.pressure, PressureForm::excess);
+  s.fluid.width = 0.03;
+  EXPECT_THAT(problems_of(s), HasSubstr("fluid.width: 0.03 m is wider than the domain"));
+}
+
 }  // namespace
 }  // namespace varve::core

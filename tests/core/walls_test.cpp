@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/simulation.h"
 #include "tests/core/scenes.h"
@@ -145,6 +146,96 @@ TEST(Box, WrapsIntoAHalfOpenInterval) {
   EXPECT_EQ(box.wrapped({-0.25, 0})[0], 0.75);
   // A point so little below 0 that adding the period rounds to 1.
   EXPECT_EQ(box.wrapped({-1e-20, 0})[0], 0);
+}
+
+// ---- three dimensions ----
+
+Scenario solid() {
+  Scenario s = scenes::box();
+  s.domain.dimension = 3;
+  s.domain.depth = 0.012;
+  return s;
+}
+
+Scenario pipe() {
+  Scenario s = solid();
+  s.domain.shape = Shape::pipe;
+  s.domain.width = 0.012;
+  s.domain.depth = automatic;
+  s.domain.left = -0.004;
+  return s;
+}
+
+TEST(SolidWalls, OfABoxAreSixOfAPipeThree) {
+  std::vector<std::uint32_t> numbers;
+  for (const Wall& wall : domain_walls(resolved(solid()))) numbers.push_back(wall.number);
+  EXPECT_THAT(numbers, testing::ElementsAre(0, 1, 2, 3, 4, 5));
+  const std::vector<Wall> walls = domain_walls(resolved(pipe()));
+  ASSERT_EQ(walls.size(), 3u);
+  EXPECT_EQ(walls[2].number, wall_pipe);
+  EXPECT_TRUE(walls[2].is_pipe());
+  Scenario open = solid();
+  open.domain.faces = Boundary::periodic;
+  EXPECT_EQ(domain_walls(resolved(open)).size(), 4u);
+}
+
+TEST(SolidWalls, OfAPipeLieAtItsRadiusAllAround) {
+  const Wall wall = domain_walls(resolved(pipe())).back();
+  const double x = 0.002, z = 0.006, r = 0.006;  // axis and radius
+  const Vec<double, 3> inside(x + 0.6 * 0.005, 0.01, z - 0.8 * 0.005);
+  EXPECT_NEAR(distance_inside<3>(wall, inside), r - 0.005, 1e-15);
+  const Vec<double, 3> normal = inward_normal<3>(wall, inside);
+  EXPECT_NEAR(normal[0], -0.6, 1e-12);
+  EXPECT_EQ(normal[1], 0);
+  EXPECT_NEAR(normal[2], 0.8, 1e-12);
+  EXPECT_LT(distance_inside<3>(wall, {x + 0.007, 0, z}), 0);
+  // On the axis there is no nearest point, but always the same normal.
+  EXPECT_EQ(inward_normal<3>(wall, {wall.centre_x, 0, wall.centre_z}),
+            (Vec<double, 3>(1, 0, 0)));
+}
+
+TEST(SolidDummies, SurroundABoxOnAllSides) {
+  EXPECT_EQ(wall_dummies<3>(resolved(solid()), 3).size(), 26u * 36 * 18 - 20 * 30 * 12);
+  Scenario s = solid();
+  s.domain.faces = Boundary::periodic;
+  EXPECT_EQ(wall_dummies<3>(resolved(s), 3).size(), (26u * 36 - 20 * 30) * 12);
+}
+
+TEST(SolidDummies, AndTheFluidOfAPipeTileTheLattice) {
+  const Scenario s = resolved(pipe());
+  const auto dummies = wall_dummies<3>(s, 3);
+  std::size_t beside = 0, across = 0;
+  for (const auto& dummy : dummies) {
+    const double x = dummy.position[0] - 0.002, z = dummy.position[2] - 0.006;
+    const double r = std::sqrt(x * x + z * z);
+    EXPECT_LT(r, 0.009);
+    if (dummy.wall == wall_pipe) {
+      ++beside;
+      EXPECT_GE(r, 0.006);
+    } else {
+      ++across;
+      EXPECT_TRUE(dummy.wall == wall_bottom || dummy.wall == wall_top);
+    }
+  }
+  std::size_t within = 0, fluid = 0;
+  for (int k = -3; k < 15; ++k)
+    for (int i = -3; i < 15; ++i) {
+      within += in_pipe(i, k, 12, 3) ? 1 : 0;
+      fluid += in_pipe(i, k, 12) ? 1 : 0;
+    }
+  EXPECT_EQ(fluid, 112u);
+  EXPECT_EQ(beside, 30 * (within - fluid));
+  EXPECT_EQ(across, 6 * within);
+}
+
+TEST(SolidDummies, OfALidMoveWithIt) {
+  Scenario s = solid();
+  s.domain.lid_speed = 0.3;
+  s.domain.floor_speed = -0.1;
+  for (const auto& dummy : wall_dummies<3>(resolved(s), 2))
+    EXPECT_EQ(dummy.speed_x, dummy.wall == wall_top      ? 0.3
+                             : dummy.wall == wall_bottom ? -0.1
+                                                         : 0.0);
 }
 
 }  // namespace
