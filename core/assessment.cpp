@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/contact_law.h"
 #include "core/kernel.h"
 #include "core/math.h"
 #include "core/parameters.h"
@@ -24,7 +25,7 @@ bool any_side(const Scenario& s, Boundary kind) {
 }
 
 bool grains_move(const Scenario& s) {
-  return s.has_grains() && s.grains.motion == GrainMotion::free;
+  return s.has_grains() && s.grains.motion != GrainMotion::frozen;
 }
 
 class Assessor {
@@ -56,12 +57,12 @@ class Assessor {
     if (s_.has_fluid())
       a_.fluid_mass = s_.fluid.density * volume * static_cast<double>(lattice.particles);
     if (!s_.has_grains()) return;
-    a_.grains = static_cast<std::uint64_t>(s_.grains.rows * s_.grains.columns *
-                                           s_.grains.layers);
-    a_.grain_mass = static_cast<double>(a_.grains) * grain_mass(s_);
+    a_.grains = static_cast<std::uint64_t>(s_.grain_count());
+    const GrainTotals totals = grain_totals(s_);
+    a_.grain_mass = totals.mass;
     // The grains' volume is taken out of the fluid only where it feels them.
     if (s_.is_coupled() && s_.coupling.mode == CouplingMode::two_way)
-      a_.fluid_mass -= s_.fluid.density * static_cast<double>(a_.grains) * grain_volume(s_);
+      a_.fluid_mass -= s_.fluid.density * totals.volume;
   }
 
   void step() {
@@ -79,26 +80,26 @@ class Assessor {
     if (!s_.has_fluid()) return;
     if (s_.has_grains()) {
       a_.terminal_speed = core::terminal_speed(s_);
-      a_.reynolds = s_.fluid.density * a_.speeds.grains * s_.grains.diameter / s_.fluid.viscosity;
+      a_.reynolds = s_.fluid.density * a_.speeds.grains * largest_diameter(s_) / s_.fluid.viscosity;
       a_.stokes = s_.grains.density / s_.fluid.density * a_.reynolds / 9;
     }
     a_.mach = std::max(a_.speeds.fluid, a_.speeds.grains) / s_.fluid.sound_speed;
   }
 
-  /// Speed at which a grain can hit the floor.
-  double impact_speed() const {
-    if (s_.is_coupled()) return a_.speeds.grains;
-    const double fall = std::sqrt(2 * s_.gravity.magnitude * s_.domain.height);
-    return std::max(fall, a_.speeds.grains);
-  }
-
   void contact() {
     if (!grains_move(s_)) return;
-    // Undamped: v sqrt(m / k), the largest compression of the spring.
-    const double m = grain_mass(s_);
-    a_.overlap = impact_speed() * std::sqrt(m / s_.contact.stiffness) / s_.grains.diameter;
-    const double zeta = 0.5 * s_.contact.damping;
-    a_.restitution = zeta < 1 ? core::exp(-pi * zeta / std::sqrt(1 - zeta * zeta)) : 0.0;
+    const double speed = impact_speed(s_);
+    for (const GrainSpecies& each : species_of(s_)) {
+      const double m = grain_mass(s_, each), radius = 0.5 * each.diameter;
+      const ContactPair wall = contact_pair(s_.contact, static_cast<int>(s_.domain.dimension),
+                                            {radius, m, m * radius * radius}, nullptr);
+      // Undamped: the largest compression of the spring, v sqrt(m / k) or Hertz's.
+      const double most = s_.contact.law == ContactLaw::linear
+                              ? speed * std::sqrt(m / s_.contact.stiffness)
+                              : pow(1.875 * m * speed * speed / wall.stiffness, 0.4);
+      a_.overlap = std::max(a_.overlap, most / each.diameter);
+    }
+    a_.restitution = restitution_of(0.5 * s_.contact.damping);
   }
 
   void log() {
@@ -176,11 +177,12 @@ class Assessor {
   void warn_about_grains() {
     if (!grains_move(s_)) return;
     if (a_.overlap > 0.05)
-      warn("contact.stiffness", "an impact at " + rough_number(impact_speed()) +
+      warn(s_.contact.law == ContactLaw::linear ? "contact.stiffness" : "contact.youngs_modulus",
+           "an impact at " + rough_number(impact_speed(s_)) +
                                     " m/s will overlap by " + rough_number(100 * a_.overlap) +
                                     " % of a diameter; below 5 % is sound");
     if (!s_.is_coupled()) return;
-    const double ratio = s_.coupling.length / s_.grains.diameter;
+    const double ratio = s_.coupling.length / largest_diameter(s_);
     if (ratio < 1)
       warn("coupling.length",
            rough_number(ratio) +
@@ -270,11 +272,24 @@ std::vector<ModelUse> models_of(const Scenario& s) {
   const bool body = fluid && (s.fluid.body_force_x != 0 || s.fluid.body_force_y != 0 ||
                               s.fluid.body_force_z != 0);
   add("body force", body, body ? "fluid.body_force_x, _y, _z" : "zero");
-  const std::string array = setting("grains.rows", s) + ", " + setting("grains.columns", s);
-  add("grains", grains, array);
+  add("grains", grains,
+      grains ? std::to_string(s.grain_count()) + ", " + setting("grains.arrangement", s)
+             : setting("grains.rows", s) + ", " + setting("grains.columns", s));
+  add("grain species", grains && s.species.size() > 0,
+      s.species.empty() ? "one" : std::to_string(s.species.size() + 1));
   const bool moving = grains_move(s);
   const std::string still = grains ? setting("grains.motion", s) : "no grains";
   add("contacts", moving, moving ? "grains that move" : still);
+  add("Hertz-Mindlin contacts", moving && s.contact.law == ContactLaw::hertz,
+      moving ? setting("contact.law", s) : still);
+  add("rolling friction", moving && s.contact.rotation && s.contact.rolling_friction > 0,
+      moving ? setting("contact.rolling_friction", s) : still);
+  add("lubrication", moving && coupled && s.contact.lubrication,
+      moving ? setting("contact.lubrication", s) : still);
+  add("added mass", moving && coupled && s.coupling.added_mass > 0,
+      moving ? setting("coupling.added_mass", s) : still);
+  add("driven grains", s.has_grains() && s.grains.motion == GrainMotion::driven,
+      setting("grains.motion", s));
   add("friction and rotation", moving && s.contact.rotation,
       moving ? setting("contact.rotation", s) : still);
   const std::string alone = !fluid ? "no fluid" : !grains ? "no grains" : "";

@@ -1,32 +1,60 @@
 #include "core/constants.h"
 
+#include <algorithm>
+
 #include "core/criteria.h"
 #include "core/kernel.h"
 #include "core/math.h"
 
 namespace varve::core {
 
+template <int D>
+SpeciesConstants<D> species_constants(double diameter, double density) {
+  const double d = diameter;
+  SpeciesConstants<D> one;
+  one.diameter = d;
+  one.radius = 0.5 * d;
+  one.volume = D == 2 ? 0.25 * pi * d * d : pi * d * d * d / 6;
+  one.mass = density * one.volume;
+  one.inertia = (D == 2 ? 0.5 : 0.4) * one.mass * one.radius * one.radius;
+  return one;
+}
+
+template <int D>
+void Constants<D>::set_pairs() {
+  const auto body = [](const SpeciesConstants<D>& one) {
+    return ContactBody{one.radius, one.mass + one.added_mass, one.inertia};
+  };
+  pairs.clear();
+  largest_diameter = least_diameter = species.front().diameter;
+  for (const SpeciesConstants<D>& one : species) {
+    largest_diameter = std::max(largest_diameter, one.diameter);
+    least_diameter = std::min(least_diameter, one.diameter);
+    for (const SpeciesConstants<D>& other : species) {
+      const ContactBody partner = body(other);
+      pairs.push_back(contact_pair(contact, D, body(one), &partner));
+    }
+    pairs.push_back(contact_pair(contact, D, body(one), nullptr));
+  }
+}
+
 namespace {
 
 template <int D>
 void set_grains(const Scenario& s, Constants<D>& c) {
-  const double d = s.grains.diameter;
-  c.diameter = d;
-  c.radius = 0.5 * d;
-  c.grain_volume = D == 2 ? 0.25 * pi * d * d : pi * d * d * d / 6;
-  c.grain_mass = s.grains.density * c.grain_volume;
-  c.grain_inertia = (D == 2 ? 0.5 : 0.4) * c.grain_mass * c.radius * c.radius;
   c.frozen = s.grains.motion == GrainMotion::frozen;
   // With hydrostatics taken out, the fluid's excess pressure does not carry a grain: its weight is
   // the submerged one. In the full form the pressure gradient does, and Archimedes is not added.
   const bool submerged = c.coupled && !c.full_pressure;
-  const double density = submerged ? s.grains.density - s.fluid.density : s.grains.density;
-  c.grain_weight = density * c.grain_volume * c.gravity;
-  c.stiffness = s.contact.stiffness;
-  c.tangential_stiffness = s.contact.tangential_ratio * s.contact.stiffness;
-  c.damping = s.contact.damping;
-  c.friction = s.contact.friction;
-  c.rotation = s.contact.rotation;
+  for (const GrainSpecies& each : species_of(s)) {
+    SpeciesConstants<D> one = species_constants<D>(each.diameter, each.density);
+    const double density = submerged ? each.density - s.fluid.density : each.density;
+    one.weight = density * one.volume * c.gravity;
+    if (c.coupled) one.added_mass = s.coupling.added_mass * s.fluid.density * one.volume;
+    c.species.push_back(one);
+  }
+  c.contact = s.contact;
+  c.set_pairs();
   c.substeps = substeps(s);
 }
 
@@ -78,6 +106,10 @@ Constants<D> constants_of(const Scenario& s) {
   return c;
 }
 
+template struct Constants<2>;
+template struct Constants<3>;
+template SpeciesConstants<2> species_constants<2>(double, double);
+template SpeciesConstants<3> species_constants<3>(double, double);
 template Constants<2> constants_of<2>(const Scenario&);
 template Constants<3> constants_of<3>(const Scenario&);
 

@@ -3,11 +3,27 @@
 
 #include <cstdint>
 
+#include <vector>
+
+#include "core/contact_law.h"
 #include "core/neighbors.h"
 #include "core/scenario.h"
 #include "core/state.h"
 
 namespace varve::core {
+
+/// A grain of one species.
+template <int D>
+struct SpeciesConstants {
+  double diameter = 0, radius = 0;  // [m]
+  double volume = 0, mass = 0;      // [m3], [kg] (m2 and kg/m in 2D)
+  double inertia = 0;               // [kg m2] 1/2 m R^2 disc, 2/5 m R^2 sphere
+  double added_mass = 0;            // [kg] of fluid that has to move with it
+  Vec<double, D> weight = Vec<double, D>::Zero();  // [N] submerged in the excess form
+};
+/// All but added mass and weight.
+template <int D>
+SpeciesConstants<D> species_constants(double diameter, double density);
 
 template <int D>
 struct Constants {
@@ -25,15 +41,12 @@ struct Constants {
   Vec<double, D> gravity = Vec<double, D>::Zero();           // [m/s2]
   Vec<double, D> fluid_acceleration = Vec<double, D>::Zero();  // gravity (full form) and body force
   // grains
-  double diameter = 0, radius = 0;           // [m]
-  double grain_volume = 0, grain_mass = 0;   // [m3], [kg] (m2 and kg/m in 2D)
-  double grain_inertia = 0;                  // [kg m2] 1/2 m R^2 disc, 2/5 m R^2 sphere
-  Vec<double, D> grain_weight = Vec<double, D>::Zero();  // [N] submerged in the excess form
+  std::vector<SpeciesConstants<D>> species;
+  double largest_diameter = 0, least_diameter = 0;  // [m]
   bool frozen = false;
   // contact
-  double stiffness = 0, tangential_stiffness = 0;  // [N/m]
-  double damping = 0, friction = 0;                // [-]
-  bool rotation = false;
+  Contact contact;
+  std::vector<ContactPair> pairs;  // of species i, j at i (n + 1) + j; j = n: a wall
   std::int64_t substeps = 1;
   // coupling
   bool coupled = false, two_way = false;
@@ -45,6 +58,9 @@ struct Constants {
 
   double dt = 0;
   Periodicity<D> period;
+
+  /// Fills `pairs` and the extreme diameters from species and contact.
+  void set_pairs();
 };
 
 template <int D>

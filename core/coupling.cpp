@@ -165,14 +165,15 @@ void CouplingStage<D, P>::porosity(const Constants<D>& c, const State<D, P>& sta
   compute_weights(c, state, state.fluid.position, workers);
   workers.run(state.grains.size(), 1, [&](std::size_t begin, std::size_t end, unsigned) {
     for (std::size_t i = begin; i < end; ++i) {
-      spread_volume_[i] = c.grain_volume;
+      const double own = c.species[state.grains.species[i]].volume;
+      spread_volume_[i] = own;
       if (!c.conservative_porosity) continue;
       double of_fluid = 0;
       for (std::uint32_t slot = fluid_of_.start[i]; slot < fluid_of_.start[i + 1]; ++slot)
         of_fluid += static_cast<double>(
                         volume_before[static_cast<std::size_t>(fluid_of_.index[slot])]) *
                     weights_[slot];
-      if (of_fluid > 0) spread_volume_[i] = c.grain_volume / of_fluid;
+      if (of_fluid > 0) spread_volume_[i] = own / of_fluid;
     }
   });
   // Clamps are counted per fluid particle and added up in one fixed order; integers have no order.
@@ -200,10 +201,10 @@ double CouplingStage<D, P>::others_porosity(const Constants<D>& c, const State<D
   const CouplingKernel<D> kernel(c.coupling_length);
   double solid = 0;
   for (const std::int32_t j : grains_of_.of(i))
-    solid += c.grain_volume *
+    solid += c.species[state.grains.species[static_cast<std::size_t>(j)]].volume *
              kernel.value(separation<D>(c, state.grains.position[i],
                                         state.grains.position[static_cast<std::size_t>(j)]));
-  const double own = c.grain_volume * kernel.value(0);
+  const double own = c.species[state.grains.species[i]].volume * kernel.value(0);
   return c.exclude_own_volume ? 1 - solid / (1 - own) : 1 - (solid + own);
 }
 
@@ -295,10 +296,11 @@ GrainForce<D> CouplingStage<D, P>::force_on(const Constants<D>& c, const State<D
   }
   const double eps = others_porosity(c, state, i);
   f.porosity = std::max(eps, c.porosity_floor);
+  const SpeciesConstants<D>& one = c.species[state.grains.species[i]];
   // A grain that has left the fluid feels none of it.
   if (f.weight <= 0) return f;
   f.fluid_velocity = velocity / f.weight;
-  f.hydrodynamic = c.grain_volume * stress / f.weight;
+  f.hydrodynamic = one.volume * stress / f.weight;
   if (c.conjugate_pressure) {
     f.pressure = pressure_force_[i];
     f.hydrodynamic += f.pressure;
@@ -307,7 +309,8 @@ GrainForce<D> CouplingStage<D, P>::force_on(const Constants<D>& c, const State<D
   const Vec<double, D> slip = f.fluid_velocity - v;
   double speed2 = 0;
   for (int k = 0; k < D; ++k) speed2 += slip[k] * slip[k];
-  const Slip argument{std::sqrt(speed2), f.porosity, c.diameter, c.reference_density, c.viscosity};
+  const Slip argument{std::sqrt(speed2), f.porosity, one.diameter, c.reference_density,
+                      c.viscosity};
   f.coefficient = drag_coefficient<D>(law, argument);
   return f;
 }

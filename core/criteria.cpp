@@ -4,21 +4,23 @@
 #include <cmath>
 #include <limits>
 
+#include "core/contact_law.h"
 #include "core/drag.h"
 #include "core/initial_flow.h"
 #include "core/kernel.h"
 #include "core/math.h"
 #include "core/parameters.h"
+#include "core/random.h"
 #include "core/walls.h"
 
 namespace varve::core {
 namespace {
 
 template <int D>
-double balance_speed(const Scenario& scenario, double weight) {
+double balance_speed(const Scenario& scenario, double diameter, double weight) {
   const DragLaw<D> law = make_drag_law<D>(scenario.coupling.drag);
   const auto drag = [&](double speed) {
-    return speed * drag_coefficient<D>(law, {speed, 1.0, scenario.grains.diameter,
+    return speed * drag_coefficient<D>(law, {speed, 1.0, diameter,
                                              scenario.fluid.density, scenario.fluid.viscosity});
   };
   double low = 0, high = 1e-9;
@@ -36,14 +38,39 @@ double balance_speed(const Scenario& scenario, double weight) {
   return high;
 }
 
-double length_of(double x, double y, double z) { return std::sqrt(x * x + y * y + z * z); }
+double length_of(double x, double y, double z = 0) { return std::sqrt(x * x + y * y + z * z); }
+
+/// [m/s] of the fastest grain at the start.
+double first_speed(const Scenario& s) {
+  if (s.grains.arrangement != Arrangement::list)
+    return length_of(s.grains.velocity_x, s.grains.velocity_y, s.grains.velocity_z);
+  double most = 0;
+  for (const ListedGrain& grain : s.grains.list)
+    most = std::max(most, length_of(grain.velocity[0], grain.velocity[1], grain.velocity[2]));
+  return most;
+}
+
+/// Calls visit(pair) for every pair of species and each with a wall.
+template <class Visit>
+void each_pair(const Scenario& s, const Visit& visit) {
+  std::vector<ContactBody> bodies;
+  const int dimension = static_cast<int>(s.domain.dimension);
+  for (const GrainSpecies& species : species_of(s)) {
+    const double radius = 0.5 * species.diameter, mass = grain_mass(s, species);
+    bodies.push_back({radius, mass, (dimension == 2 ? 0.5 : 0.4) * mass * radius * radius});
+  }
+  for (const ContactBody& i : bodies) {
+    visit(contact_pair(s.contact, dimension, i, nullptr));
+    for (const ContactBody& j : bodies) visit(contact_pair(s.contact, dimension, i, &j));
+  }
+}
 
 double body_force(const Scenario& s) {
   return length_of(s.fluid.body_force_x, s.fluid.body_force_y, s.fluid.body_force_z);
 }
 
 bool grains_move(const Scenario& scenario) {
-  return scenario.has_grains() && scenario.grains.motion == GrainMotion::free;
+  return scenario.has_grains() && scenario.grains.motion != GrainMotion::frozen;
 }
 
 /// What a body force does to the fluid: where it drives it round through periodic sides, the speed
@@ -81,31 +108,119 @@ double periodic_minimum(const Scenario& s) {
   if (s.has_fluid()) least = kernel_support(s) + list_skin_ratio * smoothing_length(s);
   if (s.is_coupled())
     least = std::max(least, coupling_radius(s) + list_skin_ratio * smoothing_length(s));
-  if (s.has_grains()) least = std::max(least, s.grains.diameter * (1 + list_skin_ratio));
+  if (s.has_grains()) least = std::max(least, largest_diameter(s) * (1 + list_skin_ratio));
   return 2 * least;
 }
 
-double grain_volume(const Scenario& s) {
-  const double d = s.grains.diameter;
+std::vector<GrainSpecies> species_of(const Scenario& s) {
+  std::vector<GrainSpecies> all{{"grains", s.grains.diameter, s.grains.density, s.grains.share}};
+  for (GrainSpecies each : s.species) {
+    if (std::isnan(each.diameter)) each.diameter = s.grains.diameter;
+    if (std::isnan(each.density)) each.density = s.grains.density;
+    all.push_back(std::move(each));
+  }
+  return all;
+}
+
+std::uint32_t species_at_start(const Scenario& s, std::uint64_t id) {
+  if (s.grains.arrangement == Arrangement::list) return s.grains.list[id].species;
+  if (s.species.empty()) return 0;
+  constexpr std::uint64_t draw = 32;  // no other use of a grain's id has this number
+  double total = s.grains.share;
+  for (const GrainSpecies& each : s.species) total += each.share;
+  const double at = total * uniform(static_cast<std::uint64_t>(s.grains.seed), id, draw);
+  double sum = s.grains.share;
+  std::uint32_t number = 0;
+  while (number < s.species.size() && !(at < sum)) sum += s.species[number++].share;
+  return number;
+}
+
+double largest_diameter(const Scenario& s) {
+  double most = s.grains.diameter;
+  for (const GrainSpecies& each : s.species)
+    if (each.diameter > most) most = each.diameter;
+  return most;
+}
+
+double least_diameter(const Scenario& s) {
+  double least = s.grains.diameter;
+  for (const GrainSpecies& each : s.species)
+    if (each.diameter < least) least = each.diameter;
+  return least;
+}
+
+double grain_volume(const Scenario& s, const GrainSpecies& species) {
+  const double d = species.diameter;
   return s.domain.dimension == 2 ? pi * d * d / 4 : pi * d * d * d / 6;
 }
 
-double grain_mass(const Scenario& s) { return s.grains.density * grain_volume(s); }
+double grain_mass(const Scenario& s, const GrainSpecies& species) {
+  return species.density * grain_volume(s, species);
+}
+
+double grain_volume(const Scenario& s) { return grain_volume(s, species_of(s).front()); }
+double grain_mass(const Scenario& s) { return grain_mass(s, species_of(s).front()); }
+
+GrainTotals grain_totals(const Scenario& s) {
+  const std::vector<GrainSpecies> species = species_of(s);
+  std::vector<std::int64_t> counts(species.size(), 0);
+  const std::int64_t grains = s.grain_count();
+  if (species.size() == 1) counts[0] = grains;
+  for (std::int64_t i = 0; species.size() > 1 && i < grains; ++i)
+    ++counts[species_at_start(s, static_cast<std::uint64_t>(i))];
+  GrainTotals totals;
+  for (std::size_t k = 0; k < species.size(); ++k) {
+    totals.volume += static_cast<double>(counts[k]) * grain_volume(s, species[k]);
+    totals.mass += static_cast<double>(counts[k]) * grain_mass(s, species[k]);
+  }
+  return totals;
+}
 
 double least_effective_mass(const Scenario& s) {
-  const bool one = s.grains.rows == 1 && s.grains.columns == 1 && s.grains.layers == 1;
-  return one ? grain_mass(s) : 0.5 * grain_mass(s);
+  const std::vector<GrainSpecies> species = species_of(s);
+  double least = grain_mass(s, species.front());
+  for (const GrainSpecies& each : species) least = std::min(least, grain_mass(s, each));
+  return s.grain_count() == 1 ? least : 0.5 * least;
+}
+
+double impact_speed(const Scenario& s) {
+  const double expected = expected_speeds(s).grains;
+  if (s.is_coupled()) return expected;
+  return std::max(std::sqrt(2 * s.gravity.magnitude * s.domain.height), expected);
 }
 
 double contact_time(const Scenario& s) {
-  return pi * std::sqrt(least_effective_mass(s) / s.contact.stiffness);
+  if (s.contact.law == ContactLaw::linear)
+    return pi * std::sqrt(least_effective_mass(s) / s.contact.stiffness);
+  // It hardly depends on the speed; where nothing is known to move, a slow contact.
+  constexpr double slow = 1e-3;
+  const double speed = std::max(slow, impact_speed(s));
+  double shortest = std::numeric_limits<double>::infinity();
+  each_pair(s, [&](const ContactPair& pair) {
+    shortest = std::min(shortest, undamped_contact_time(s.contact, pair, speed));
+  });
+  return shortest;
+}
+
+double lubrication_time(const Scenario& s) {
+  double shortest = std::numeric_limits<double>::infinity();
+  if (!s.contact.lubrication || !s.is_coupled()) return shortest;
+  each_pair(s, [&](const ContactPair& pair) {
+    const double rough = s.contact.lubrication_gap * pair.effective_radius;
+    const double thinness = s.domain.dimension == 2 ? 1 / (rough * std::sqrt(rough)) : 1 / rough;
+    const double resistance = s.fluid.viscosity * pair.lubrication * thinness;
+    shortest = std::min(shortest, pair.effective_mass / resistance);
+  });
+  return shortest;
 }
 
 std::int64_t substeps(const Scenario& s) {
   if (s.time.substeps > 0) return s.time.substeps;
   if (!grains_move(s)) return 1;
   // A step of exactly tc0 / 30 is one sub-step, whichever way the division rounds.
-  const double exact = substeps_per_contact * s.time.dt / contact_time(s);
+  double exact = substeps_per_contact * s.time.dt / contact_time(s);
+  if (s.contact.lubrication)
+    exact = std::max(exact, substeps_per_film * s.time.dt / lubrication_time(s));
   return std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(exact * (1 - 1e-12))));
 }
 
@@ -117,10 +232,16 @@ bool has_free_surface(const Scenario& s) {
 
 double terminal_speed(const Scenario& s) {
   if (!s.has_grains() || !s.has_fluid()) return 0;
-  const double excess = std::abs(s.grains.density - s.fluid.density);
-  const double weight = excess * grain_volume(s) * s.gravity.magnitude;
-  if (weight == 0) return 0;
-  return s.domain.dimension == 2 ? balance_speed<2>(s, weight) : balance_speed<3>(s, weight);
+  double fastest = 0;
+  for (const GrainSpecies& each : species_of(s)) {
+    const double excess = std::abs(each.density - s.fluid.density);
+    const double weight = excess * grain_volume(s, each) * s.gravity.magnitude;
+    if (weight == 0) continue;
+    fastest = std::max(fastest, s.domain.dimension == 2
+                                    ? balance_speed<2>(s, each.diameter, weight)
+                                    : balance_speed<3>(s, each.diameter, weight));
+  }
+  return fastest;
 }
 
 double SpeedEstimate::sound_speed() const {
@@ -157,8 +278,7 @@ SpeedEstimate expected_speeds(const Scenario& s) {
   if (s.has_grains() && s.grains.motion == GrainMotion::frozen) {
     estimate.grains_reason = "grains are frozen";
   } else if (s.has_grains()) {
-    const double first =
-        length_of(s.grains.velocity_x, s.grains.velocity_y, s.grains.velocity_z);
+    const double first = first_speed(s);
     const double settling = s.is_coupled() ? terminal_speed(s) : 0;
     estimate.grains = std::max(first, settling);
     estimate.grains_reason =
@@ -175,8 +295,9 @@ double outer_acceleration(const Scenario& s) {
     if (s.fluid.pressure != PressureForm::excess) largest += s.gravity.magnitude;
   }
   if (grains_move(s)) {
-    const double ratio =
-        s.is_coupled() ? std::abs(1 - s.fluid.density / s.grains.density) : 1.0;
+    double ratio = s.is_coupled() ? 0.0 : 1.0;
+    for (const GrainSpecies& each : species_of(s))
+      if (s.is_coupled()) ratio = std::max(ratio, std::abs(1 - s.fluid.density / each.density));
     largest = std::max(largest, std::min(1.0, ratio) * s.gravity.magnitude);
   }
   return largest;
@@ -210,6 +331,11 @@ std::vector<StepLimit> step_limits(const Scenario& s) {
     if (counted) {
       limits.push_back({"contact", "substeps tc0 / 30", n * tc0 / substeps_per_contact,
                         n * tc0 / substeps_per_contact_min});
+      if (s.contact.lubrication) {
+        const double film = n * lubrication_time(s);
+        limits.push_back({"lubrication", "substeps m / (10 lambda)", film / substeps_per_film,
+                          film / substeps_per_film_min});
+      }
     } else if (!s.has_fluid()) {
       constexpr double without_limit = std::numeric_limits<double>::infinity();
       limits.push_back({"contact", "tc0 / 30", tc0 / substeps_per_contact, without_limit});
@@ -278,6 +404,6 @@ Lattice fluid_lattice(const Scenario& s) {
   return lattice;
 }
 
-double grain_pitch(const Scenario& s) { return s.grains.diameter * (1 + s.grains.gap); }
+double grain_pitch(const Scenario& s) { return largest_diameter(s) * (1 + s.grains.gap); }
 
 }  // namespace varve::core

@@ -26,20 +26,47 @@ inline constexpr double list_skin_ratio = 0.25;
 /// that no pair meets through two images.
 double periodic_minimum(const Scenario& scenario);
 
-/// [m3, m2 in 2D] of one grain.
+/// All kinds of grains, by their number in the state: first the one of [grains], called "grains",
+/// then those of [species.NAME]; what a species leaves open is filled in.
+std::vector<GrainSpecies> species_of(const Scenario& scenario);
+/// Number of the species of grain `id` at the start: of the list, else drawn by (grains.seed, id)
+/// with the species' shares.
+std::uint32_t species_at_start(const Scenario& scenario, std::uint64_t id);
+/// [m] over all species.
+double largest_diameter(const Scenario& scenario);
+double least_diameter(const Scenario& scenario);
+
+/// [m3, m2 in 2D] of one grain of a species, or of species 0.
+double grain_volume(const Scenario& scenario, const GrainSpecies& species);
 double grain_volume(const Scenario& scenario);
-/// [kg, kg/m in 2D] of one grain.
+/// [kg, kg/m in 2D] of one grain of a species, or of species 0.
+double grain_mass(const Scenario& scenario, const GrainSpecies& species);
 double grain_mass(const Scenario& scenario);
-/// [kg, kg/m in 2D] least effective mass of any contact: m/2 of a pair, m where there is one grain.
+/// Volume [m3] and mass [kg] of all grains at the start, per metre of depth in 2D.
+struct GrainTotals {
+  double volume = 0, mass = 0;
+};
+GrainTotals grain_totals(const Scenario& scenario);
+/// [kg, kg/m in 2D] least effective mass of any contact: half the lightest grain's, all of it where
+/// there is one grain.
 double least_effective_mass(const Scenario& scenario);
-/// [s] tc0 = pi sqrt(m_eff,min / k), undamped. Needs contact.stiffness.
+/// [m/s] at which a grain may hit something: without coupling that of a fall through the domain.
+double impact_speed(const Scenario& scenario);
+/// [s] tc0 of the shortest contact, undamped: pi sqrt(m_eff,min / k), by Hertz's law at
+/// impact_speed(). Needs contact.stiffness or contact.youngs_modulus.
 double contact_time(const Scenario& scenario);
-/// Grain sub-steps per step: time.substeps, or ceil(30 dt / tc0) where that is 0; 1 without grains
-/// that move. Needs contact.stiffness and time.dt.
+/// [s] m_eff / lambda of the shortest: in which the thinnest film stops a grain. Infinite without
+/// lubrication.
+double lubrication_time(const Scenario& scenario);
+/// Grain sub-steps per step: time.substeps, or as many as the shortest contact and the thinnest
+/// film need where that is 0; 1 without grains that move. Needs contact.stiffness and time.dt.
 std::int64_t substeps(const Scenario& scenario);
 /// Sub-steps to a shortest contact where they are chosen, and the fewest that are let through.
 inline constexpr double substeps_per_contact = 30;
 inline constexpr double substeps_per_contact_min = 10;
+/// The same for the time in which a film stops a grain.
+inline constexpr double substeps_per_film = 10;
+inline constexpr double substeps_per_film_min = 1;
 
 /// A free surface: an open top, or a box that is not full at the start.
 bool has_free_surface(const Scenario& scenario);

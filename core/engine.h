@@ -73,6 +73,8 @@ class Engine final : public Simulation {
   void build_tables();
   void build_grain_tables();
   void check_counts(const State<D, P>& state) const;
+  bool is_driven() const { return scenario_.grains.motion == GrainMotion::driven; }
+  bool rolls() const { return c_.contact.rotation && c_.contact.rolling_friction > 0; }
   void refresh_spans();
   void adopt_scenario();  // constants, walls and lists from scenario_
   void build_walls();

@@ -66,9 +66,11 @@ void Engine<D, P>::build_fields() {
   add("grains.species", "grains", FieldType::u32, 1, "", false, true);
   add("grains.position", "grains", position, D, "m");
   add("grains.velocity", "grains", real, D, "m/s");
-  if (c_.rotation) add("grains.spin", "grains", real, spin_components<D>, "rad/s");
+  if (c_.contact.rotation) add("grains.spin", "grains", real, spin_components<D>, "rad/s");
+  if (is_driven()) add("grains.driven", "grains", FieldType::u32, 1, "");
   add("contacts.key", "contacts", FieldType::u64, 3, "", true);
-  if (c_.rotation) add("contacts.spring", "contacts", real, D, "m");
+  if (c_.contact.rotation) add("contacts.spring", "contacts", real, D, "m");
+  if (rolls()) add("contacts.rolling", "contacts", real, spin_components<D>, "rad");
 }
 
 template <int D, class P>
@@ -92,9 +94,11 @@ void Engine<D, P>::refresh_spans() {
   spans_.push_back(span_of(state_.grains.species));
   spans_.push_back(span_of(state_.grains.position));
   spans_.push_back(span_of(state_.grains.velocity));
-  if (c_.rotation) spans_.push_back(span_of(state_.grains.spin));
+  if (c_.contact.rotation) spans_.push_back(span_of(state_.grains.spin));
+  if (is_driven()) spans_.push_back(span_of(state_.grains.driven));
   spans_.push_back(span_of(state_.contacts.key));
-  if (c_.rotation) spans_.push_back(span_of(state_.contacts.spring));
+  if (c_.contact.rotation) spans_.push_back(span_of(state_.contacts.spring));
+  if (rolls()) spans_.push_back(span_of(state_.contacts.rolling));
 }
 
 template <int D, class P>
@@ -133,9 +137,11 @@ void Engine<D, P>::set_state(std::span<const FieldSpan> values) {
     take(state.grains.species);
     take(state.grains.position);
     take(state.grains.velocity);
-    if (c_.rotation) take(state.grains.spin);
+    if (c_.contact.rotation) take(state.grains.spin);
+    if (is_driven()) take(state.grains.driven);
     take(state.contacts.key);
-    if (c_.rotation) take(state.contacts.spring);
+    if (c_.contact.rotation) take(state.contacts.spring);
+    if (rolls()) take(state.contacts.rolling);
   }
   check_counts(state);
   state_ = std::move(state);
@@ -164,10 +170,16 @@ void Engine<D, P>::check_counts(const State<D, P>& state) const {
   same("grains", grains, state.grains.species.size());
   same("grains", grains, state.grains.position.size());
   same("grains", grains, state.grains.velocity.size());
-  if (c_.rotation) {
+  for (const std::uint32_t species : state.grains.species)
+    if (species >= c_.species.size())
+      throw ModelError("grains.species: a grain of species " + std::to_string(species) +
+                       ", this scene has " + std::to_string(c_.species.size()));
+  if (c_.contact.rotation) {
     same("grains", grains, state.grains.spin.size());
     same("contacts", state.contacts.key.size(), state.contacts.spring.size());
   }
+  if (is_driven()) same("grains", grains, state.grains.driven.size());
+  if (rolls()) same("contacts", state.contacts.key.size(), state.contacts.rolling.size());
 }
 
 template <int D, class P>

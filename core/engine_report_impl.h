@@ -127,7 +127,8 @@ StepLedger Engine<D, P>::ledger() const {
   for (std::size_t i = 0; i < state_.grains.size(); ++i) {
     const V dv = state_.grains.velocity[i].template cast<double>() -
                  next_.grains.velocity[i].template cast<double>();
-    grain_change += c_.grain_mass * dv;
+    const SpeciesConstants<D>& one = c_.species[state_.grains.species[i]];
+    grain_change += one.mass * dv;
     V acting = V::Zero();
     if (c_.coupled) {
       const GrainForce<D>& f = coupling_.grain_forces()[i];
@@ -135,8 +136,8 @@ StepLedger Engine<D, P>::ledger() const {
     }
     from_fluid += acting;
     // Something holds a frozen grain against everything else.
-    grain_external += c_.frozen ? V(-acting) : c_.grain_weight;
-    scale += acting.norm() + c_.grain_weight.norm();
+    grain_external += c_.frozen ? V(-acting) : one.weight;
+    scale += acting.norm() + one.weight.norm();
   }
   // Part of the reactions near a wall is the wall's: it mirrors the grains.
   if (c_.conjugate_pressure) reactions -= coupling_.walls_on_fluid();

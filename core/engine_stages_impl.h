@@ -87,6 +87,9 @@ void Engine<D, P>::digest_stage(Stage stage) {
         s.values(std::span<const std::uint64_t>(parts));
       }
       s.values(scalars(next_.contacts.spring));
+      s.values(scalars(next_.contacts.rolling));
+      for (const std::uint64_t driven : next_.grains.driven)
+        s.values(std::span<const std::uint64_t>(&driven, 1));
       break;
     case Stage::integration:
       s.values(scalars(next_.fluid.velocity));

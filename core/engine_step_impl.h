@@ -234,17 +234,19 @@ void Engine<D, P>::move_grains() {
   next_.grains = state_.grains;
   next_.contacts = state_.contacts;
   const std::size_t n = state_.grains.size();
-  work_.outer.assign(n, {c_.grain_weight, Vec<double, D>::Zero(), 0});
-  if (coupled())
-    for (std::size_t i = 0; i < n; ++i) {
-      const GrainForce<D>& f = coupling_.grain_forces()[i];
-      work_.outer[i] = {c_.grain_weight + f.hydrodynamic, f.fluid_velocity, f.coefficient};
-    }
+  work_.outer.resize(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    const Vec<double, D>& weight = c_.species[state_.grains.species[i]].weight;
+    work_.outer[i] = {weight, Vec<double, D>::Zero(), 0};
+    if (!coupled()) continue;
+    const GrainForce<D>& f = coupling_.grain_forces()[i];
+    work_.outer[i] = {weight + f.hydrodynamic, f.fluid_velocity, f.coefficient};
+  }
   if (c_.frozen) {
     hold_grains();
     return;
   }
-  contacts_.advance(c_, work_.outer, walls_, scenario_.guards.overlap * c_.diameter,
+  contacts_.advance(c_, work_.outer, walls_, scenario_.guards.overlap,
                     state_.clock.step + 1, next_.grains, next_.contacts);
   counters_.grain_substeps += static_cast<std::uint64_t>(c_.substeps);
   count_pass(engine_detail::pass_contacts);
@@ -299,15 +301,17 @@ template <int D, class P>
 void Engine<D, P>::check_grains() const {
   // Without fluid there is no sound speed: a grain that crosses itself within a sub-step has
   // failed.
-  const double limit = has_fluid()
-                           ? scenario_.guards.speed * c_.sound_speed
-                           : c_.diameter * static_cast<double>(c_.substeps) / c_.dt;
+  const double of_sound = scenario_.guards.speed * c_.sound_speed;
+  const double per_diameter = static_cast<double>(c_.substeps) / c_.dt;
   const std::uint64_t step = state_.clock.step + 1;
   for (std::size_t i = 0; i < next_.grains.size(); ++i) {
     const GrainState<D, P>& grains = next_.grains;
     const std::uint64_t id = grains.id[i];
+    const double limit = has_fluid()
+                             ? of_sound
+                             : c_.species[grains.species[i]].diameter * per_diameter;
     engine_detail::require_finite<D>(grains.velocity[i], "grains.velocity", step, id);
-    if (c_.rotation)
+    if (c_.contact.rotation)
       engine_detail::require_finite<spin_components<D>>(grains.spin[i], "grains.spin", step, id);
     engine_detail::require_finite<D>(grains.position[i], "grains.position", step, id);
     double speed2 = 0;

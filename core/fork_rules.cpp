@@ -97,6 +97,11 @@ std::vector<Problem> set_changed_keys(Scenario& scenario, const Settings& settin
   for (std::size_t i = 0; i < settings.size(); ++i) {
     const auto& [key, value] = settings[i];
     const Parameter* parameter = find_parameter(key);
+    if (key.starts_with("species.")) {
+      problems.push_back({key, "cannot change in a fork or an event: " +
+                                   std::string(fixed_reason(*find_parameter("grains.diameter")))});
+      continue;
+    }
     if (!parameter) {
       const std::string_view nearest = nearest_key(key);
       problems.push_back({key, "unknown key" + (nearest.empty()
@@ -139,6 +144,14 @@ std::vector<Problem> set_changed_keys(Scenario& scenario, const Settings& settin
 std::vector<Problem> changed_limits(const Scenario& before, const Scenario& after,
                                     const Settings& settings, int anchor) {
   std::vector<Problem> problems = width_problems(before, after, anchor);
+  const bool hertz = after.contact.law == ContactLaw::hertz;
+  for (const bool of_linear : {true, false}) {
+    const std::string key = of_linear ? "contact.stiffness" : "contact.youngs_modulus";
+    if (is_set(settings, key) && after.has_grains() && hertz == of_linear)
+      problems.push_back({key, std::string("contact.law is ") + (hertz ? "hertz" : "linear") +
+                                   ": change " +
+                                   (hertz ? "contact.youngs_modulus" : "contact.stiffness")});
+  }
   if (is_set(settings, "contact.friction") && after.has_grains() && !after.contact.rotation &&
       after.contact.friction > 0)
     problems.push_back({"contact.friction",

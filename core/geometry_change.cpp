@@ -25,7 +25,9 @@ struct Move {
   const Scenario& before;
   Scenario after;
   double left_outward, right_outward;
+  std::vector<GrainSpecies> species = species_of(before);
 
+  double diameter(std::uint32_t of_species) const { return species[of_species].diameter; }
   Box<D> old_box() const { return domain_box<D>(before); }
   Box<D> new_box() const { return domain_box<D>(after); }
   bool closed() const { return !has_free_surface(before); }
@@ -91,10 +93,11 @@ bool contains(const std::vector<std::uint64_t>& sorted, std::uint64_t id) {
 template <int D>
 std::vector<std::size_t> grains_outside(const Move<D>& move, const DoubleState<D>& state) {
   std::vector<std::size_t> outside;
-  const double d = move.before.grains.diameter;
-  for (std::size_t i = 0; i < state.grains.size(); ++i)
+  for (std::size_t i = 0; i < state.grains.size(); ++i) {
+    const double d = move.diameter(state.grains.species[i]);
     if (move.beyond(state.grains.position[i][0]) + 0.5 * d > tolerated_overlap * d)
       outside.push_back(i);
+  }
   return outside;
 }
 
@@ -102,9 +105,9 @@ std::vector<std::size_t> grains_outside(const Move<D>& move, const DoubleState<D
 template <int D>
 std::string narrowest_advice(const Move<D>& move, const DoubleState<D>& state) {
   double reach = 0;  // [m] that the walls have to stay further out
-  const double d = move.before.grains.diameter;
-  for (const auto& x : state.grains.position)
-    reach = std::max(reach, move.beyond(x[0]) + (0.5 - tolerated_overlap) * d);
+  for (std::size_t i = 0; i < state.grains.size(); ++i)
+    reach = std::max(reach, move.beyond(state.grains.position[i][0]) +
+                                (0.5 - tolerated_overlap) * move.diameter(state.grains.species[i]));
   const double dx = move.before.has_fluid() ? move.before.fluid.spacing : reach;
   const double back = std::ceil(reach / dx - 1e-9) * dx;
   const double walls = move.left_outward != 0 && move.right_outward != 0 ? 2 : 1;
@@ -116,14 +119,15 @@ std::string narrowest_advice(const Move<D>& move, const DoubleState<D>& state) {
 template <int D>
 void check_pushed(const Move<D>& move, const DoubleState<D>& state,
                   const std::vector<std::size_t>& pushed) {
-  const double d = move.before.grains.diameter;
   const Box<D> box = move.new_box();
   for (const std::size_t i : pushed)
     for (std::size_t j = 0; j < state.grains.size(); ++j) {
       if (j == i) continue;
       const Vec<double, D> apart =
           box.separation(state.grains.position[i], state.grains.position[j]);
-      const double overlap = d - std::sqrt(squared<D>(apart));
+      const double d_i = move.diameter(state.grains.species[i]);
+      const double d_j = move.diameter(state.grains.species[j]), d = std::min(d_i, d_j);
+      const double overlap = 0.5 * (d_i + d_j) - std::sqrt(squared<D>(apart));
       if (overlap > tolerated_overlap * d)
         throw ModelError("domain.width: pushed inside the new wall, grain " +
                          std::to_string(state.grains.id[i]) + " would overlap grain " +
@@ -159,7 +163,7 @@ void settle_grains(const Move<D>& move, OutsideMode mode, DoubleState<D>& state,
   if (mode == OutsideMode::push) {
     for (const std::size_t i : outside)
       grains.position[i][0] =
-          move.inside(grains.position[i][0], 0.5 * move.before.grains.diameter);
+          move.inside(grains.position[i][0], 0.5 * move.diameter(grains.species[i]));
     check_pushed(move, state, outside);
     report.grains_pushed = std::move(ids);
     return;
@@ -170,6 +174,7 @@ void settle_grains(const Move<D>& move, OutsideMode mode, DoubleState<D>& state,
   erase_marked(grains.position, marked);
   erase_marked(grains.velocity, marked);
   erase_marked(grains.spin, marked);
+  erase_marked(grains.driven, marked);
   erase_marked(grains.id, marked);
   report.grains_removed = std::move(ids);
 }
@@ -188,6 +193,7 @@ void prune_contacts(const Move<D>& move, DoubleState<D>& state, GeometryReport& 
     report.contacts_removed += marked[c] ? 1 : 0;
   }
   erase_marked(contacts.spring, marked);
+  erase_marked(contacts.rolling, marked);
   erase_marked(contacts.key, marked);
 }
 
@@ -507,10 +513,10 @@ SideWalls moved_side_walls(const Scenario& before, double new_width, int anchor)
     throw ModelError("domain.width: the sides are periodic; only walls can move");
   if (!(new_width > 0) || !std::isfinite(new_width))
     throw ModelError("domain.width: " + number_text(new_width) + " m; expected a length > 0");
-  if (before.has_grains() && new_width < before.grains.diameter)
+  if (before.has_grains() && new_width < largest_diameter(before))
     throw ModelError("domain.width: " + number_text(new_width) +
                      " m is narrower than a grain; expected at least " +
-                     number_text(before.grains.diameter) + " m");
+                     number_text(largest_diameter(before)) + " m");
   double outward = change / shares;
   if (before.has_fluid()) {
     const double dx = before.fluid.spacing, jumps = outward / dx;

@@ -6,6 +6,7 @@
 
 #include "core/constants.h"
 #include "core/coupling.h"
+#include "core/grain_placement.h"
 #include "core/initial_flow.h"
 #include "core/math.h"
 #include "core/random.h"
@@ -20,7 +21,7 @@ using DoubleState = State<D, DoublePrecision>;
 
 // Draws of one id are told apart by number; grains use others than the fluid, since both may have
 // the same seed.
-constexpr std::uint64_t first_fluid_draw = 0, first_grain_draw = 16;
+constexpr std::uint64_t first_fluid_draw = 0;
 
 void require_resolved(const Scenario& s, int dimension) {
   const auto need = [](bool given, const char* key) {
@@ -37,7 +38,9 @@ void require_resolved(const Scenario& s, int dimension) {
     need(number(s.fluid.sound_speed), "fluid.sound_speed");
     need(s.fluid.pressure != PressureForm::automatic, "fluid.pressure");
   }
-  if (s.has_grains()) {
+  const Arrangement arrangement = s.grains.arrangement;
+  if (s.has_grains() &&
+      (arrangement == Arrangement::square || arrangement == Arrangement::hexagonal)) {
     need(number(s.grains.centre_x), "grains.centre_x");
     need(number(s.grains.lowest_y), "grains.lowest_y");
     if (dimension == 3) need(number(s.grains.centre_z), "grains.centre_z");
@@ -72,28 +75,21 @@ Vec<double, D> as_stored(const Vec<double, D>& x) {
 
 template <int D, class P>
 void place_grains(const Scenario& s, DoubleState<D>& state) {
-  const Grains& g = s.grains;
-  const double pitch = g.diameter * (1.0 + g.gap);
   const Box<D> box = domain_box<D>(s);
-  const double first_x = g.centre_x - 0.5 * pitch * static_cast<double>(g.columns - 1);
-  const double first_z = g.centre_z - 0.5 * pitch * static_cast<double>(g.layers - 1);
-  for (std::int64_t row = 0; row < g.rows; ++row)
-    for (std::int64_t layer = 0; layer < g.layers; ++layer)
-      for (std::int64_t column = 0; column < g.columns; ++column) {
-        const std::uint64_t id = state.grains.size();
-        const auto site = point<D>(first_x + pitch * static_cast<double>(column),
-                                   g.lowest_y + pitch * static_cast<double>(row),
-                                   first_z + pitch * static_cast<double>(layer));
-        const Vec<double, D> x =
-            jittered<D>(site, g.jitter * g.diameter, static_cast<std::uint64_t>(g.seed), id,
-                        first_grain_draw);
-        state.grains.id.push_back(id);
-        state.grains.species.push_back(0);
-        state.grains.position.push_back(as_stored<D, P>(box.wrapped(x)));
-        state.grains.velocity.push_back(point<D>(g.velocity_x, g.velocity_y, g.velocity_z));
-        if (s.contact.rotation)
-          state.grains.spin.push_back(Vec<double, spin_components<D>>::Zero());
-      }
+  for (const ListedGrain& grain : placed_grains(s)) {
+    const auto& x = grain.position;
+    const auto& v = grain.velocity;
+    state.grains.id.push_back(state.grains.size());
+    state.grains.species.push_back(grain.species);
+    state.grains.position.push_back(as_stored<D, P>(box.wrapped(point<D>(x[0], x[1], x[2]))));
+    state.grains.velocity.push_back(point<D>(v[0], v[1], v[2]));
+    if (s.contact.rotation) {
+      Vec<double, spin_components<D>> spin;
+      for (int k = 0; k < spin_components<D>; ++k) spin[k] = grain.spin[D == 2 ? 2 : k];
+      state.grains.spin.push_back(spin);
+    }
+    if (s.grains.motion == GrainMotion::driven) state.grains.driven.push_back(1);
+  }
 }
 
 template <int D, class P>
@@ -194,8 +190,10 @@ State<D, To> converted(const State<D, From>& from) {
   to.grains.position = converted_vectors<Position>(from.grains.position);
   to.grains.velocity = converted_vectors<Real>(from.grains.velocity);
   to.grains.spin = converted_vectors<Real>(from.grains.spin);
+  to.grains.driven = from.grains.driven;
   to.contacts.key = from.contacts.key;
   to.contacts.spring = converted_vectors<Real>(from.contacts.spring);
+  to.contacts.rolling = converted_vectors<Real>(from.contacts.rolling);
   return to;
 }
 

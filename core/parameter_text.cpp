@@ -1,4 +1,5 @@
 // Values as text and back, by the parameter table.
+#include <algorithm>
 #include <charconv>
 #include <system_error>
 
@@ -201,6 +202,28 @@ std::optional<ValueError> set_parameter(Scenario& scenario, const Parameter& par
   return std::visit(set, parameter.access);
 }
 
+const Parameter* species_parameter(std::string_view leaf) {
+  if (leaf != "diameter" && leaf != "density" && leaf != "share") return nullptr;
+  return find_parameter("grains." + std::string(leaf));
+}
+
+std::optional<ValueError> set_species(Scenario& scenario, std::string_view name,
+                                      std::string_view leaf, std::string_view value) {
+  const auto found = std::find_if(scenario.species.begin(), scenario.species.end(),
+                                  [&](const GrainSpecies& each) { return each.name == name; });
+  GrainSpecies& species = found != scenario.species.end()
+                              ? *found
+                              : scenario.species.emplace_back(GrainSpecies{std::string(name)});
+  // Read as the key of the same name in [grains] is.
+  Scenario scratch;
+  const auto error = set_parameter(scratch, *species_parameter(leaf), value);
+  if (error) return error;
+  if (leaf == "diameter") species.diameter = scratch.grains.diameter;
+  if (leaf == "density") species.density = scratch.grains.density;
+  if (leaf == "share") species.share = scratch.grains.share;
+  return std::nullopt;
+}
+
 std::string get_parameter(const Scenario& scenario, const Parameter& parameter) {
   struct {
     Scenario& s;
@@ -226,6 +249,12 @@ std::vector<std::pair<std::string, std::string>> all_settings(const Scenario& sc
   std::vector<std::pair<std::string, std::string>> all;
   for (const Parameter& parameter : parameters())
     all.emplace_back(parameter.key, get_parameter(scenario, parameter));
+  for (const GrainSpecies& each : scenario.species) {
+    const std::string section = "species." + each.name + ".";
+    all.emplace_back(section + "diameter", number_text(each.diameter));
+    all.emplace_back(section + "density", number_text(each.density));
+    all.emplace_back(section + "share", number_text(each.share));
+  }
   for (const ScheduledChange& change : scenario.changes) {
     const std::string section = "event." + change.name + ".";
     if (change.at_step >= 0) {
@@ -247,9 +276,10 @@ std::string canonical_text(const Scenario& scenario) {
   std::string text;
   std::string section;
   for (const auto& [key, value] : all_settings(scenario)) {
-    // "domain.width" lies in [domain], "event.NAME.contact.damping" in [event.NAME].
+    // "domain.width" lies in [domain], "event.NAME.contact.damping" in [event.NAME],
+    // "species.NAME.density" in [species.NAME].
     std::size_t dot = key.find('.');
-    if (key.starts_with("event.")) dot = key.find('.', dot + 1);
+    if (key.starts_with("event.") || key.starts_with("species.")) dot = key.find('.', dot + 1);
     if (key.substr(0, dot) != section) {
       if (!section.empty()) text += '\n';
       section = key.substr(0, dot);

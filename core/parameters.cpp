@@ -24,11 +24,14 @@ constexpr std::array drags{"stokes"sv, "schiller_naumann"sv, "dallavalle_di_feli
 constexpr std::array kernels{"wendland_c2"sv, "cubic"sv, "quintic"sv};
 constexpr std::array shapes{"box"sv, "pipe"sv};
 constexpr std::array flows{"rest"sv, "uniform"sv, "shear"sv, "taylor_green"sv};
-constexpr std::array motions{"free"sv, "frozen"sv};
+constexpr std::array motions{"free"sv, "frozen"sv, "driven"sv};
+constexpr std::array arrangements{"square"sv, "hexagonal"sv, "random"sv, "list"sv};
+constexpr std::array contact_laws{"linear"sv, "hertz"sv};
 constexpr std::array tiers{"deltas"sv, "digests"sv};
 
 constexpr Dimension pure{}, length{0, 1, 0}, time_dimension{0, 0, 1}, speed{0, 1, -1},
-    acceleration{0, 1, -2}, density{1, -3, 0}, viscosity{1, -1, -1}, stiffness{1, 0, -2};
+    acceleration{0, 1, -2}, density{1, -3, 0}, viscosity{1, -1, -1}, stiffness{1, 0, -2},
+    modulus{1, -1, -2}, frequency{0, 0, -1};
 
 constexpr double huge = 1e12;        // of lengths, times and the like: far beyond any scene
 constexpr double counts = 1e9;       // of whole numbers
@@ -182,6 +185,16 @@ void add_fluid(std::vector<Parameter>& table) {
 
 void add_grains(std::vector<Parameter>& table) {
   const auto add = [&table](Parameter parameter) { table.push_back(parameter); };
+  add(choice("grains.arrangement", arrangements, Change::never, VARVE_CHOICE(grains.arrangement),
+             "array of rows and columns, random packing of grains.count, or the list in a file"));
+  add(text("grains.file", Change::never, VARVE_TEXT(grains.file),
+           "list of grains, beside the scenario: columns x,y,z,species,vx,vy,vz,wx,wy,wz"));
+  add(whole("grains.count", {0, counts}, Change::never, VARVE_WHOLE(grains.count),
+            "grains of a random packing"));
+  add(real("grains.from_y", "m", length, any, automatic_ok, Change::never,
+           VARVE_REAL(grains.from_y), "lower end of a random packing; auto: the bottom"));
+  add(real("grains.to_y", "m", length, any, automatic_ok, Change::never, VARVE_REAL(grains.to_y),
+           "upper end of a random packing; auto: the top"));
   add(whole("grains.rows", {0, counts}, Change::never, VARVE_WHOLE(grains.rows),
             "of the array, upwards; 0: no grains"));
   add(whole("grains.columns", {0, counts}, Change::never, VARVE_WHOLE(grains.columns),
@@ -192,6 +205,8 @@ void add_grains(std::vector<Parameter>& table) {
            VARVE_REAL(grains.diameter), "of a disc or sphere"));
   add(real("grains.density", "kg/m3", density, {0, 1e9, true}, given, Change::never,
            VARVE_REAL(grains.density), "of the solid"));
+  add(real("grains.share", "", pure, {0, 1e9}, given, Change::never, VARVE_REAL(grains.share),
+           "relative number of these grains where there are other species, [species.NAME]"));
   add(real("grains.centre_x", "m", length, any, automatic_ok, Change::never,
            VARVE_REAL(grains.centre_x), "x of the array's middle; auto: the domain's middle"));
   add(real("grains.lowest_y", "m", length, any, automatic_ok, Change::never,
@@ -203,16 +218,29 @@ void add_grains(std::vector<Parameter>& table) {
            "free space between neighbours, over diameter"));
   add(real("grains.jitter", "", pure, {0, 0.5}, given, Change::never, VARVE_REAL(grains.jitter),
            "largest displacement from the array along each axis, over diameter"));
-  add(whole("grains.seed", {0, seeds}, Change::never, VARVE_WHOLE(grains.seed), "of the jitter"));
+  add(whole("grains.seed", {0, seeds}, Change::never, VARVE_WHOLE(grains.seed),
+            "of jitter, random packing and species"));
   add(real("grains.velocity_x", "m/s", speed, {-1e6, 1e6}, given, Change::never,
            VARVE_REAL(grains.velocity_x), "at the start"));
   add(real("grains.velocity_y", "m/s", speed, {-1e6, 1e6}, given, Change::never,
            VARVE_REAL(grains.velocity_y), "at the start"));
   add(real("grains.velocity_z", "m/s", speed, {-1e6, 1e6}, given, Change::never,
            VARVE_REAL(grains.velocity_z), "at the start; 3D only"));
+  add(real("grains.spin_x", "1/s", frequency, {-1e9, 1e9}, given, Change::never,
+           VARVE_REAL(grains.spin_x), "in radians, at the start; 3D only"));
+  add(real("grains.spin_y", "1/s", frequency, {-1e9, 1e9}, given, Change::never,
+           VARVE_REAL(grains.spin_y), "in radians, at the start; 3D only"));
+  add(real("grains.spin_z", "1/s", frequency, {-1e9, 1e9}, given, Change::never,
+           VARVE_REAL(grains.spin_z), "in radians, at the start"));
   add(choice("grains.motion", motions, Change::never, VARVE_CHOICE(grains.motion),
-             "frozen: held in place, felt by the fluid"));
+             "frozen: held in place, felt by the fluid; driven: at their first velocity until "
+             "touched"));
+}
 
+void add_contact(std::vector<Parameter>& table) {
+  const auto add = [&table](Parameter parameter) { table.push_back(parameter); };
+  add(choice("contact.law", contact_laws, Change::never, VARVE_CHOICE(contact.law),
+             "linear spring, or Hertz and Mindlin's with Tsuji's damping (3D)"));
   add(real("contact.time", "s", time_dimension, {0, 1e3, true}, given, Change::never,
            VARVE_REAL(contact.time),
            "duration of an undamped contact with a wall; used where stiffness is auto"));
@@ -221,13 +249,31 @@ void add_grains(std::vector<Parameter>& table) {
            "normal spring, per metre of depth in 2D; auto: from contact.time"));
   add(real("contact.damping", "", pure, {0, 2}, given, Change::parameter,
            VARVE_REAL(contact.damping), "alpha in eta = alpha sqrt(m_eff k); 2 is critical"));
+  add(real("contact.restitution", "", pure, {0.02, 1}, automatic_ok, Change::never,
+           VARVE_REAL(contact.restitution), "dry; if given it sets contact.damping"));
+  add(real("contact.youngs_modulus", "Pa", modulus, {0, 1e15, true}, automatic_ok,
+           Change::parameter, VARVE_REAL(contact.youngs_modulus),
+           "of the grains, for Hertz's law; walls are rigid"));
+  add(real("contact.poisson_ratio", "", pure, {0, 0.5}, given, Change::never,
+           VARVE_REAL(contact.poisson_ratio), "of the grains, for Hertz's law"));
   add(real("contact.friction", "", pure, {0, 1e6}, given, Change::parameter,
            VARVE_REAL(contact.friction), "Coulomb coefficient"));
   add(flag("contact.rotation", Change::never, VARVE_FLAG(contact.rotation),
            "off: no friction, no spin; nothing of either is stored"));
-  add(real("contact.tangential_ratio", "", pure, {0, 1, true}, automatic_ok, Change::never,
+  add(real("contact.tangential_ratio", "", pure, {0, 1}, automatic_ok, Change::never,
            VARVE_REAL(contact.tangential_ratio),
            "tangential over normal stiffness; auto: 1/3 for discs, 2/7 for spheres"));
+  add(real("contact.rolling_friction", "", pure, {0, 10}, given, Change::never,
+           VARVE_REAL(contact.rolling_friction),
+           "largest rolling moment over effective radius x normal force; 0: none is stored"));
+  add(flag("contact.lubrication", Change::never, VARVE_FLAG(contact.lubrication),
+           "viscous film between grains, and grains and walls, that nearly touch"));
+  add(real("contact.lubrication_range", "", pure, {0, 2, true}, given, Change::never,
+           VARVE_REAL(contact.lubrication_range),
+           "gap within which the film acts, over the effective radius"));
+  add(real("contact.lubrication_gap", "", pure, {1e-6, 1}, given, Change::never,
+           VARVE_REAL(contact.lubrication_gap),
+           "gap below which the film grows no stronger (roughness), over the effective radius"));
 }
 
 void add_coupling(std::vector<Parameter>& table) {
@@ -249,6 +295,9 @@ void add_coupling(std::vector<Parameter>& table) {
            "least porosity used in density and drag; auto: 0.30 in 2D, 0.25 in 3D"));
   add(flag("coupling.exclude_own_volume", Change::never, VARVE_FLAG(coupling.exclude_own_volume),
            "the porosity a grain feels leaves its own volume out"));
+  add(real("coupling.added_mass", "", pure, {0, 2}, given, Change::never,
+           VARVE_REAL(coupling.added_mass),
+           "fluid that a grain has to accelerate, over the displaced; 0.5 sphere, 1 disc; 0: off"));
 
   add(real("time.cfl", "", pure, {0, 1, true}, given, Change::never, VARVE_REAL(time.cfl),
            "dt over smoothing length / sound speed"));
@@ -290,6 +339,7 @@ std::vector<Parameter> make_table() {
   add_scene(table);
   add_fluid(table);
   add_grains(table);
+  add_contact(table);
   add_coupling(table);
   return table;
 }

@@ -70,6 +70,13 @@ std::string expected_text(const Parameter& parameter);
 /// Why a fork cannot change a key: "" if it can.
 std::string_view fixed_reason(const Parameter& parameter);
 
+/// Sets "diameter", "density" or "share" of the species called `name`, which is added if it is not
+/// there yet. Returns an error text as set_parameter() does; `leaf` must be one of the three.
+std::optional<ValueError> set_species(Scenario& scenario, std::string_view name,
+                                      std::string_view leaf, std::string_view value);
+/// The key of [grains] that says what a species' `leaf` takes, or nullptr.
+const Parameter* species_parameter(std::string_view leaf);
+
 /// One thing wrong with a scenario as a whole, at a key.
 struct Problem {
   std::string key;   ///< key whose line should be shown

@@ -6,13 +6,13 @@
 #include "core/kernel.h"
 #include "core/math.h"
 #include "core/parameters.h"
+#include "core/resolve_grains.h"
 
 namespace varve::core {
 namespace {
 
 // Far above what one machine holds; a slip of the unit is caught before memory is asked for.
 constexpr double particles_max = 1e8;
-constexpr double grains_max = 1e7;
 constexpr std::int64_t substeps_max = 1'000'000;
 constexpr double rounding = 1e-9;
 
@@ -23,7 +23,7 @@ class Resolver {
   std::vector<Problem> run() {
     if (!check_table() || !check_extent()) return std::move(problems_);
     resolve_fluid();
-    resolve_grains();
+    resolve_grains(s_, problems_);
     resolve_coupling();
     check_periodic();
     if (problems_.empty()) resolve_sound_speed();
@@ -252,96 +252,20 @@ class Resolver {
               "expected excess or auto");
   }
 
-  void resolve_grains() {
-    if (!s_.has_grains()) return;
-    const double rows = static_cast<double>(s_.grains.rows);
-    const double columns = static_cast<double>(s_.grains.columns);
-    const double count = rows * columns * static_cast<double>(s_.grains.layers);
-    if (count > grains_max) {
-      problem("grains.rows", rough_number(count) + " grains; at most " + rough_number(grains_max) +
-                                 " are possible");
-      return;
-    }
-    const double pitch = grain_pitch(s_);
-    const double half_width = 0.5 * (columns - 1) * pitch;
-    const double array_height = (rows - 1) * pitch;
-    if (std::isnan(s_.grains.centre_x))
-      s_.grains.centre_x = s_.domain.left + 0.5 * s_.domain.width;
-    if (std::isnan(s_.grains.lowest_y))
-      s_.grains.lowest_y = 0.5 * (s_.domain.height - array_height);
-    check_inside("grains.centre_x", s_.domain.left, s_.domain.width,
-                 s_.grains.centre_x - half_width, 2 * half_width,
-                 s_.domain.sides == Boundary::periodic, "wide", "columns");
-    check_inside("grains.lowest_y", 0, s_.domain.height, s_.grains.lowest_y, array_height,
-                 s_.domain.bottom == Boundary::periodic, "high", "rows");
-    if (s_.domain.dimension == 3) check_depth_of_array(half_width);
-    if (count > 1 && s_.grains.jitter > 0.5 * s_.grains.gap * (1 + rounding))
-      problem("grains.jitter", number_text(s_.grains.jitter) +
-                                   " can make neighbours overlap; largest safe value " +
-                                   number_below(0.5 * s_.grains.gap) + " (half of grains.gap)");
-    if (std::isnan(s_.contact.tangential_ratio))
-      s_.contact.tangential_ratio = s_.domain.dimension == 2 ? 1.0 / 3.0 : 2.0 / 7.0;
-    if (std::isnan(s_.contact.stiffness)) {
-      const double frequency = pi / s_.contact.time;
-      s_.contact.stiffness = grain_mass(s_) * (frequency * frequency);
-    }
-  }
-
-  void check_depth_of_array(double half_width) {
-    const double half_depth =
-        0.5 * static_cast<double>(s_.grains.layers - 1) * grain_pitch(s_);
-    if (std::isnan(s_.grains.centre_z)) s_.grains.centre_z = 0.5 * s_.domain.depth;
-    check_inside("grains.centre_z", 0, s_.domain.depth, s_.grains.centre_z - half_depth,
-                 2 * half_depth, s_.domain.faces == Boundary::periodic, "deep", "layers");
-    if (s_.domain.shape != Shape::pipe) return;
-    const double radius = 0.5 * s_.domain.width;
-    const double x = std::abs(s_.grains.centre_x - s_.domain.left - radius) + half_width;
-    const double z = std::abs(s_.grains.centre_z - radius) + half_depth;
-    const double reach = s_.grains.diameter * (0.5 + 1.5 * s_.grains.jitter);
-    const double corner = std::sqrt(x * x + z * z) + reach;
-    if (corner > radius * (1 + rounding))
-      problem("grains.columns", "a corner of the array reaches " + rough_number(corner) +
-                                    " m from the pipe's axis; its radius is " +
-                                    number_text(radius) + " m");
-  }
-
-  /// Grains whose first centre lies at `first` and whose last lies `span` further must fit between
-  /// `from` and `from + extent`.
-  void check_inside(const std::string& key, double from, double extent, double first, double span,
-                    bool periodic, std::string_view word, std::string_view lines) {
-    const double reach = s_.grains.diameter * (0.5 + s_.grains.jitter);
-    const double slack = rounding * extent;
-    const double room = extent - span - 2 * reach;
-    if (room < -slack) {
-      problem("grains." + std::string(lines),
-              "the array is " + rough_number(span + 2 * reach) + " m " + std::string(word) +
-                  ", the domain " + number_text(extent) + " m; largest number that fits " +
-                  std::to_string(static_cast<std::int64_t>(std::max(
-                      0.0, std::floor((extent - 2 * reach) / grain_pitch(s_) + 1 + rounding)))));
-      return;
-    }
-    if (periodic) return;
-    const double low = from + reach, high = from + extent - reach - span;
-    if (first >= low - slack && first <= high + slack) return;
-    // The key names the middle of the columns but the first of the rows.
-    const double shift = key == "grains.lowest_y" ? 0.0 : 0.5 * span;
-    problem(key, number_text(first + shift) + " m puts grains outside the domain; expected " +
-                     rough_number(low + shift) + ".." + rough_number(high + shift) + " m");
-  }
-
   void resolve_coupling() {
     const bool flat = s_.domain.dimension == 2;
     if (std::isnan(s_.coupling.porosity_floor)) s_.coupling.porosity_floor = flat ? 0.30 : 0.25;
-    if (std::isnan(s_.coupling.length)) s_.coupling.length = s_.grains.diameter;
+    if (std::isnan(s_.coupling.length)) s_.coupling.length = largest_diameter(s_);
     if (!s_.is_coupled()) return;
     if (!flat && s_.coupling.drag == Drag::cylinder)
       problem("coupling.drag", "'cylinder' is a law for discs; expected another one in 3D");
     // Porosity at the centre of a lone grain is 1 - V W(0): it must stay positive.
     constexpr Kernel widest = Kernel::wendland_c2;
-    const double d = s_.grains.diameter;
-    double least = std::sqrt(kernel_sigma<2, widest>() * grain_volume(s_));
+    const double d = largest_diameter(s_);
+    const double own = grain_volume(s_, {"", d, 0, 0});
+    double least = std::sqrt(kernel_sigma<2, widest>() * own);
     if (!flat) {
-      const double volume = kernel_sigma<3, widest>() * grain_volume(s_);
+      const double volume = kernel_sigma<3, widest>() * own;
       least = d;  // cube root by Newton's iteration, from above
       for (int i = 0; i < 60; ++i) least -= (least - volume / (least * least)) / 3;
     }

@@ -24,7 +24,9 @@ enum class PressureForce { conjugate, averaged };
 enum class Porosity { kernel, conservative };
 enum class CouplingMode { two_way, one_way, off };
 enum class Drag { stokes, schiller_naumann, dallavalle_di_felice, gidaspow, cylinder };
-enum class GrainMotion { free, frozen };
+enum class GrainMotion { free, frozen, driven };
+enum class Arrangement { square, hexagonal, random, list };
+enum class ContactLaw { linear, hertz };
 enum class Shape { box, pipe };
 enum class InitialFlow { rest, uniform, shear, taylor_green };
 enum class RecordTier { deltas, digests };
@@ -75,7 +77,30 @@ struct Fluid {
   double initial_speed = 0;  // [m/s] amplitude of the initial flow
 };
 
+/// A kind of grain beside the one that [grains] describes, which is species 0: [species.NAME].
+struct GrainSpecies {
+  std::string name;
+  double diameter = automatic;  // [m]; as [grains] if not given
+  double density = automatic;   // [kg/m3]; as [grains] if not given
+  double share = 1;             // [-] relative number of its grains in an array or a packing
+};
+
+/// One grain of a list (grains.file).
+struct ListedGrain {
+  std::uint32_t species = 0;
+  double position[3] = {};  // [m]
+  double velocity[3] = {};  // [m/s]
+  double spin[3] = {};      // [rad/s]; in 2D the third
+  bool operator==(const ListedGrain&) const = default;
+};
+
 struct Grains {
+  Arrangement arrangement = Arrangement::square;
+  std::string file;                    // list of grains, read by who reads the scenario
+  std::vector<ListedGrain> list;       // what stood in it
+  std::int64_t count = 0;              // of a random packing
+  double share = 1;                    // [-] relative number of species 0
+  double from_y = automatic, to_y = automatic;  // [m] heights between which a packing lies
   std::int64_t rows = 0, columns = 0;  // no grains if either is 0
   std::int64_t layers = 1;             // along z; 1 in 2D
   double diameter = 2.5e-3;            // [m]
@@ -87,16 +112,25 @@ struct Grains {
   double jitter = 0;                   // [-] of the diameter
   std::int64_t seed = 1;
   double velocity_x = 0, velocity_y = 0, velocity_z = 0;  // [m/s] at the start
+  double spin_x = 0, spin_y = 0, spin_z = 0;              // [rad/s] at the start
   GrainMotion motion = GrainMotion::free;
 };
 
 struct Contact {
+  ContactLaw law = ContactLaw::linear;
   double time = 0.5e-3;          // [s] undamped contact time with a wall, if stiffness is not given
   double stiffness = automatic;  // [N/m per m depth in 2D] k_n
   double damping = 0.2;          // [-] alpha: eta = alpha sqrt(m_eff k_n)
   double friction = 0.3;         // [-] Coulomb coefficient
   bool rotation = true;          // spin and tangential springs are part of the state
   double tangential_ratio = automatic;  // [-] k_t / k_n: 1/3 for discs, 2/7 for spheres
+  double restitution = automatic;  // [-] sets the damping if given; automatic once resolved
+  double youngs_modulus = automatic;  // [Pa] of the grains; Hertz's law
+  double poisson_ratio = 0.25;        // [-] likewise
+  double rolling_friction = 0;        // [-] largest rolling moment over (effective radius x force)
+  bool lubrication = false;           // viscous film between grains that approach
+  double lubrication_range = 0.5;     // [-] of the effective radius: gap where the film begins
+  double lubrication_gap = 1e-3;      // [-] likewise: roughness, below which it grows no more
 };
 
 struct Coupling {
@@ -107,6 +141,7 @@ struct Coupling {
   PressureForce pressure_force = PressureForce::conjugate;
   double porosity_floor = automatic;  // [-] 0.30 in 2D, 0.25 in 3D
   bool exclude_own_volume = true;
+  double added_mass = 0;  // [-] of the displaced fluid's mass
 };
 
 struct Time {
@@ -150,6 +185,7 @@ struct Scenario {
   Gravity gravity;
   Fluid fluid;
   Grains grains;
+  std::vector<GrainSpecies> species;  // beside species 0
   Contact contact;
   Coupling coupling;
   Time time;
@@ -158,7 +194,14 @@ struct Scenario {
   std::vector<ScheduledChange> changes;  // in order of at_step, then of the file
 
   bool has_fluid() const { return fluid.present; }
-  bool has_grains() const { return grains.rows > 0 && grains.columns > 0 && grains.layers > 0; }
+  bool has_grains() const { return grain_count() > 0; }
+  /// Grains at the start.
+  std::int64_t grain_count() const {
+    if (grains.arrangement == Arrangement::list)
+      return static_cast<std::int64_t>(grains.list.size());
+    if (grains.arrangement == Arrangement::random) return grains.count;
+    return grains.rows * grains.columns * grains.layers;
+  }
   bool is_coupled() const {
     return has_fluid() && has_grains() && coupling.mode != CouplingMode::off;
   }

@@ -59,6 +59,7 @@ struct GrainState {
   std::vector<Vec<typename P::Position, D>> position;
   std::vector<Vec<Real, D>> velocity;
   std::vector<Vec<Real, spin_components<D>>> spin;  // [rad/s]; empty without rotation
+  std::vector<std::uint32_t> driven;  // 1 until first touched; empty unless some are driven
   std::size_t size() const { return id.size(); }
 };
 
@@ -75,6 +76,8 @@ struct ContactState {
   std::vector<ContactKey> key;
   std::vector<Vec<typename P::Real, D>>
       spring;  // [m] tangential elongation; empty without rotation
+  std::vector<Vec<typename P::Real, spin_components<D>>>
+      rolling;  // [rad] of the rolling spring; empty without rolling friction
   std::size_t size() const { return key.size(); }
 };
 

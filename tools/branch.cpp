@@ -291,6 +291,7 @@ Branch make_branch(const io::LogReader& parent, const BranchRequest& request,
                             std::to_string(core::engine_revision)});
   // The child is run from what its log holds, as any later resume or replay of it.
   branch.genesis = make_genesis(child, {}, run_options.threads);
+  branch.genesis.files = parent.genesis().files;
   branch.engine = SimulationEngine::of_genesis(branch.genesis, parent.path(), run_options);
   branch.engine->restore(branch.first.view());
   branch.genesis.schema = branch.engine->schema();

@@ -12,6 +12,7 @@
 
 #include <fmt/format.h>
 
+#include "core/grain_placement.h"
 #include "core/parameters.h"
 #include "tools/cli.h"
 #include "tools/scenario_levels.h"
@@ -89,11 +90,13 @@ class ScenarioReader {
   }
 
   const core::Scenario& written() const { return scenario_; }
+  std::vector<std::pair<std::string, std::string>> files() { return std::move(files_); }
 
   /// Resolves, or throws ScenarioError with everything that was found.
   core::Scenario finish(const std::string& source, const ScenarioOptions& options) {
     source_ = source;
     check_length(options.needs_length);
+    take_grain_list(options);
     if (options.resolved && errors_.empty()) return std::move(scenario_);
     if (errors_.empty()) {
       for (const core::Problem& problem : core::resolve(scenario_))
@@ -184,6 +187,7 @@ class ScenarioReader {
       return error(place, place.key_column, fmt::format("'{}' was already set {}", key, where));
     }
     if (is_event_key(key)) return set_event(key, value, place);
+    if (key.starts_with("species.")) return set_species(key, value, place);
     const core::Parameter* parameter = core::find_parameter(key);
     if (!parameter) return unknown(key, core::nearest_key(key), place);
     places_.insert_or_assign(key, place);
@@ -206,6 +210,66 @@ class ScenarioReader {
     error(place, place.key_column,
           nearest.empty() ? fmt::format("unknown key '{}'", key)
                           : fmt::format("unknown key '{}'; did you mean '{}'?", key, nearest));
+  }
+
+  /// "species.fine.diameter": a key of its own kind of grains.
+  void set_species(const std::string& key, const std::string& value, Place place) {
+    const std::size_t dot = key.rfind('.');
+    const std::string name = dot > 8 ? key.substr(8, dot - 8) : "";
+    const std::string leaf = key.substr(dot + 1);
+    if (name.empty() || !core::species_parameter(leaf))
+      return error(place, place.key_column,
+                   fmt::format("unknown key '{}'; expected species.NAME.diameter, .density or "
+                               ".share", key));
+    places_.insert_or_assign(key, place);
+    if (const auto problem = core::set_species(scenario_, name, leaf, value))
+      error(place, place.value_column, key + ": " + problem->text);
+  }
+
+  /// Reads the list of grains that the scenario names; its content is kept for genesis.
+  void take_grain_list(const ScenarioOptions& options) {
+    const std::string& name = scenario_.grains.file;
+    if (name.empty()) return;
+    std::string content;
+    if (const std::string wrong = find_file(name, options, content); !wrong.empty())
+      return report("grains.file", fmt::format("'{}': {}", name, wrong));
+    auto read = core::read_grain_list(content, scenario_);
+    if (const auto* problems = std::get_if<std::vector<core::ListProblem>>(&read)) {
+      for (const core::ListProblem& problem : *problems)
+        errors_.push_back({listed_name(name, options), problem.line, 0, problem.text});
+      return;
+    }
+    scenario_.grains.list = std::get<std::vector<core::ListedGrain>>(std::move(read));
+    scenario_.grains.arrangement = core::Arrangement::list;
+    files_.emplace_back(name, std::move(content));
+  }
+
+  static std::string listed_name(const std::string& name, const ScenarioOptions& options) {
+    return options.files ? name : (std::filesystem::path(options.folder) / name).string();
+  }
+
+  /// The content of a file that the scenario names; returns what is wrong with it.
+  static std::string find_file(const std::string& name, const ScenarioOptions& options,
+                               std::string& content) {
+    if (options.files) {
+      for (const auto& [known, text] : *options.files)
+        if (known == name) {
+          content = text;
+          return "";
+        }
+      return "not embedded in the log";
+    }
+    constexpr std::size_t bytes_max = std::size_t{1} << 26;
+    const std::string path = listed_name(name, options);
+    std::error_code ignored;
+    if (std::filesystem::is_directory(path, ignored)) return "a directory; expected a file";
+    std::ifstream file(path, std::ios::binary);
+    if (!file) return std::strerror(errno);
+    content.assign(std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>());
+    if (file.bad()) return "could not be read";
+    if (content.size() > bytes_max)
+      return fmt::format("{} bytes; expected at most {}", content.size(), bytes_max);
+    return "";
   }
 
   void set_event(const std::string& key, const std::string& value, Place place) {
@@ -303,6 +367,7 @@ class ScenarioReader {
   std::map<std::string, Place> places_;    ///< by full key
   std::map<std::string, Place> sections_;  ///< by name
   std::string source_;
+  std::vector<std::pair<std::string, std::string>> files_;
   bool inside_preset_ = false;
 };
 
@@ -352,6 +417,7 @@ ScenarioSource read_scenario_text(std::string_view text, const std::string& name
   ScenarioSource source;
   source.written = reader.written();
   source.scenario = reader.finish(name, options);
+  source.files = reader.files();
   source.name = name;
   source.text = text;
   return source;
@@ -363,7 +429,9 @@ ScenarioSource load_scenario(const std::string& path_or_preset, const ScenarioOp
   const std::string text = from_file ? read_file(path_or_preset) : std::string(preset->text);
   const std::string name = from_file ? path_or_preset : fmt::format("preset {}", preset->name);
   try {
-    return read_scenario_text(text, name, options);
+    ScenarioOptions beside = options;
+    if (from_file) beside.folder = std::filesystem::path(path_or_preset).parent_path().string();
+    return read_scenario_text(text, name, beside);
   } catch (const ScenarioError& error) {
     const auto& found = error.diagnostics();
     for (std::size_t i = 0; i < std::min(found.size(), errors_shown_max); ++i)

@@ -50,11 +50,15 @@ struct ScenarioOptions {
   /// The text is a resolved scenario's canonical one (a genesis): nothing is derived or limited
   /// again. A fork's scenario need not be one that a fresh run could start with.
   bool resolved = false;
+  /// Folder of the files that the scenario names; "" is the working folder.
+  std::string folder;
+  /// Where those files are held in memory instead (a genesis): name, content.
+  const std::vector<std::pair<std::string, std::string>>* files = nullptr;
 };
 
 /// Reads and resolves a scenario held in memory; `name` stands in messages. Throws ScenarioError.
 ScenarioSource read_scenario_text(std::string_view text, const std::string& name,
-                                  const ScenarioOptions& options = {{}, false, false});
+                                  const ScenarioOptions& options = {{}, false, false, {}, nullptr});
 
 /// Reads and resolves a file, or the preset of that name where there is no such file. Prints every
 /// error to stderr and throws Exit{3} if it can't be used; UsageError for a missing file or a

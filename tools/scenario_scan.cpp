@@ -117,7 +117,9 @@ class Scanner {
     section_ = name;
     meant_ = name;
     usable_ = true;
-    if (name.starts_with("event.") && name.size() > 6) {
+    const bool is_event = name.starts_with("event.") && name.size() > 6;
+    const bool is_species = name.starts_with("species.") && name.size() > 8;
+    if (is_event || is_species) {
       note_section(number);
       return;
     }
@@ -127,6 +129,7 @@ class Scanner {
       return;
     }
     std::vector<std::string_view> all = names;
+    all.push_back("species.NAME");
     all.push_back("event.NAME");
     const std::string_view nearest = nearest_name(name, names);
     if (whole && !name.empty())

@@ -161,7 +161,8 @@ void SimulationEngine::change(const std::vector<io::Setting>& settings,
 
 core::Scenario scenario_of(const io::Genesis& genesis, const std::string& path) {
   try {
-    return read_scenario_text(genesis.scenario, path + ":scenario", {{}, false, true}).scenario;
+    const ScenarioOptions options{{}, false, true, {}, &genesis.files};
+    return read_scenario_text(genesis.scenario, path + ":scenario", options).scenario;
   } catch (const ScenarioError& error) {
     throw io::LogError(io::ErrorKind::damaged, path,
                        fmt::format("its scenario can't be read back:\n{}", error.what()));

@@ -84,7 +84,7 @@ TEST(Assessment, CountsAndNumbersOfTheDisc) {
   EXPECT_EQ(a.substeps, 19);  // 30 x 0.3125 ms / 0.5 ms = 18.75
   EXPECT_NEAR(a.reynolds, 1000 * 0.04905 * 2.5e-3 / 0.01, 0.01);
   EXPECT_NEAR(a.stokes, 1.25 * a.reynolds / 9, 1e-9);
-  EXPECT_NEAR(a.restitution, 0.729, 5e-4);
+  EXPECT_NEAR(a.restitution, 0.744, 5e-4);  // of a dashpot that never pulls
   EXPECT_GT(a.log_bytes_low, 0);
   EXPECT_GT(a.log_bytes_high, a.log_bytes_low);
 }

@@ -22,16 +22,12 @@ constexpr double no_limit = 1e300;
 /// Discs of 2.5 mm and 1250 kg/m3 whose undamped contact with a wall lasts 0.5 ms.
 Constants<2> disc_constants() {
   Constants<2> c;
-  c.diameter = 2.5e-3;
-  c.radius = 0.5 * c.diameter;
-  c.grain_volume = 0.25 * pi * c.diameter * c.diameter;
-  c.grain_mass = 1250 * c.grain_volume;
-  c.grain_inertia = 0.5 * c.grain_mass * c.radius * c.radius;
-  c.stiffness = c.grain_mass * (pi / 0.5e-3) * (pi / 0.5e-3);
-  c.tangential_stiffness = c.stiffness / 3;
-  c.damping = 0.2;
-  c.friction = 0.3;
-  c.rotation = true;
+  c.species = {species_constants<2>(2.5e-3, 1250)};
+  c.contact.stiffness = c.species[0].mass * (pi / 0.5e-3) * (pi / 0.5e-3);
+  c.contact.tangential_ratio = 1.0 / 3.0;
+  c.contact.damping = 0.2;
+  c.contact.friction = 0.3;
+  c.contact.rotation = true;
   c.dt = 0.5e-3;
   c.substeps = 30;
   return c;
@@ -59,18 +55,20 @@ struct Rig {
     outer.push_back({force, V2::Zero(), 0});
   }
   void advance() {
+    c.set_pairs();
     stage.advance(c, outer, walls, limit, ++step, grains, contacts);
   }
+  const SpeciesConstants<2>& disc() const { return c.species[0]; }
   V2 momentum() const {
     V2 sum = V2::Zero();
-    for (const V2& v : grains.velocity) sum += c.grain_mass * v;
+    for (const V2& v : grains.velocity) sum += c.species[0].mass * v;
     return sum;
   }
   double kinetic() const {
     double sum = 0;
     for (std::size_t i = 0; i < grains.size(); ++i)
-      sum += 0.5 * c.grain_mass * grains.velocity[i].squaredNorm() +
-             0.5 * c.grain_inertia * grains.spin[i].squaredNorm();
+      sum += 0.5 * c.species[0].mass * grains.velocity[i].squaredNorm() +
+             0.5 * c.species[0].inertia * grains.spin[i].squaredNorm();
     return sum;
   }
 };
@@ -87,10 +85,10 @@ double theoretical_restitution(double alpha) {
 /// Drops a disc on the floor from `gap` above it; the ratio of speeds.
 double wall_restitution(double alpha, double gap, std::int64_t substeps = 30) {
   Rig rig;
-  rig.c.damping = alpha;
+  rig.c.contact.damping = alpha;
   rig.c.substeps = substeps;
   rig.walls = {floor_plane()};
-  rig.add({0, rig.c.radius + gap}, {0, -0.2});
+  rig.add({0, rig.disc().radius + gap}, {0, -0.2});
   bool touched = false;
   for (int n = 0; n < 400; ++n) {
     rig.advance();
@@ -102,9 +100,9 @@ double wall_restitution(double alpha, double gap, std::int64_t substeps = 30) {
 
 double pair_restitution(double alpha, double gap) {
   Rig rig;
-  rig.c.damping = alpha;
+  rig.c.contact.damping = alpha;
   rig.add({0, 0}, {0.1, 0});
-  rig.add({rig.c.diameter + gap, 0}, {-0.1, 0});
+  rig.add({rig.disc().diameter + gap, 0}, {-0.1, 0});
   bool touched = false;
   for (int n = 0; n < 400; ++n) {
     rig.advance();
@@ -161,7 +159,7 @@ TEST(ContactRestitution, DoesNotDependOnTheSpeed) {
   for (const double speed : {0.01, 0.1, 0.3}) {
     Rig rig;
     rig.walls = {floor_plane()};
-    rig.add({0, rig.c.radius + speed * 1e-6}, {0, -speed});
+    rig.add({0, rig.disc().radius + speed * 1e-6}, {0, -speed});
     for (int n = 0; n < 10; ++n) rig.advance();
     found.push_back(rig.grains.velocity[0][1] / speed);
   }
@@ -172,10 +170,10 @@ TEST(ContactRestitution, DoesNotDependOnTheSpeed) {
 TEST(ContactRestitution, StiffnessDoesNotMatterIfTheSubstepsFollow) {
   for (const double factor : {1e-2, 1.0, 1e2}) {
     Rig rig;
-    rig.c.stiffness *= factor;
+    rig.c.contact.stiffness *= factor;
     rig.c.dt /= std::sqrt(factor);
     rig.walls = {floor_plane()};
-    rig.add({0, rig.c.radius + 1e-7}, {0, -0.02});
+    rig.add({0, rig.disc().radius + 1e-7}, {0, -0.02});
     for (int n = 0; n < 10; ++n) rig.advance();
     EXPECT_NEAR(rig.grains.velocity[0][1] / 0.02 / theoretical_restitution(0.2), 1, 1.2e-2);
   }
@@ -191,8 +189,8 @@ Rig crowd(std::uint64_t seed) {
     return static_cast<double>(bits >> 40) * 0x1p-24 * 2 - 1;
   };
   for (std::uint64_t i = 0; i < 16; ++i) {
-    const double x = static_cast<double>(i % 4) * 1.05 * rig.c.diameter;
-    const double y = static_cast<double>(i / 4) * 1.05 * rig.c.diameter;
+    const double x = static_cast<double>(i % 4) * 1.05 * rig.disc().diameter;
+    const double y = static_cast<double>(i / 4) * 1.05 * rig.disc().diameter;
     // Inwards, so that they meet, plus noise.
     rig.add({x, y}, {-20 * (x - 4e-3) + 0.1 * draw(i, 0), -20 * (y - 4e-3) + 0.1 * draw(i, 1)},
             50 * draw(i, 2));
@@ -238,11 +236,11 @@ TEST(ContactConservation, EnergyIsNeverGainedAcrossACrowdOfCollisions) {
 
 TEST(ContactConservation, WithoutLossesTheEnergyComesBack) {
   Rig rig;
-  rig.c.damping = 0;
-  rig.c.friction = 0;
+  rig.c.contact.damping = 0;
+  rig.c.contact.friction = 0;
   rig.c.substeps = 200;
   rig.walls = {floor_plane()};
-  rig.add({0, rig.c.radius + 1e-6}, {0.05, -0.2});
+  rig.add({0, rig.disc().radius + 1e-6}, {0.05, -0.2});
   const double start = rig.kinetic();
   for (int n = 0; n < 4; ++n) rig.advance();
   ASSERT_EQ(rig.contacts.size(), 0u);
@@ -253,10 +251,10 @@ TEST(ContactConservation, WithoutLossesTheEnergyComesBack) {
 TEST(ContactConservation, RecordedLossesAreTheEnergyThatWent) {
   for (const double friction : {0.0, 0.1, 10.0}) {
     Rig rig;
-    rig.c.friction = friction;
+    rig.c.contact.friction = friction;
     rig.c.substeps = 400;
     rig.add({0, 0}, {0.15, 0.02}, 30);
-    rig.add({rig.c.diameter * 0.9, rig.c.diameter * 0.5}, {-0.1, -0.05}, -10);
+    rig.add({rig.disc().diameter * 0.9, rig.disc().diameter * 0.5}, {-0.1, -0.05}, -10);
     const double start = rig.kinetic();
     double normal = 0, tangential = 0, sliding = 0;
     for (int n = 0; n < 20; ++n) {
@@ -287,15 +285,16 @@ TEST(ContactConservation, RecordedLossesAreTheEnergyThatWent) {
 TEST(ContactRest, OverlapCarriesTheWeight) {
   for (const double factor : {1e-2, 1.0, 1e2}) {
     Rig rig;
-    rig.c.stiffness *= factor;
+    rig.c.contact.stiffness *= factor;
     rig.c.dt /= std::sqrt(factor);
-    const double weight = 9.81 * rig.c.grain_mass;
+    const double weight = 9.81 * rig.disc().mass;
     rig.walls = {floor_plane()};
-    rig.add({0, rig.c.radius}, V2::Zero(), 0, {0, -weight});
+    rig.add({0, rig.disc().radius}, V2::Zero(), 0, {0, -weight});
     for (int n = 0; n < 2000; ++n) rig.advance();
     ASSERT_EQ(rig.contacts.size(), 1u);
-    const double overlap = rig.c.radius - rig.grains.position[0][1];
-    EXPECT_NEAR(rig.c.stiffness * overlap / weight, 1, 1e-9) << "stiffness factor " << factor;
+    const double overlap = rig.disc().radius - rig.grains.position[0][1];
+    EXPECT_NEAR(rig.c.contact.stiffness * overlap / weight, 1, 1e-9)
+        << "stiffness factor " << factor;
     EXPECT_NEAR(rig.grains.velocity[0][1], 0, 1e-12);
   }
 }
@@ -303,13 +302,13 @@ TEST(ContactRest, OverlapCarriesTheWeight) {
 TEST(ContactRest, ImplicitDragOfAnyStrengthLeavesRestAlone) {
   for (const double coefficient : {0.0, 1.0, 1e6}) {
     Rig rig;
-    const double weight = 9.81 * rig.c.grain_mass;
+    const double weight = 9.81 * rig.disc().mass;
     rig.walls = {floor_plane()};
-    rig.add({0, rig.c.radius - weight / rig.c.stiffness}, V2::Zero(), 0, {0, -weight});
+    rig.add({0, rig.disc().radius - weight / rig.c.contact.stiffness}, V2::Zero(), 0, {0, -weight});
     rig.outer[0].coefficient = coefficient;
     for (int n = 0; n < 1000; ++n) rig.advance();
-    const double overlap = rig.c.radius - rig.grains.position[0][1];
-    EXPECT_NEAR(rig.c.stiffness * overlap / weight, 1, 1e-9) << "K " << coefficient;
+    const double overlap = rig.disc().radius - rig.grains.position[0][1];
+    EXPECT_NEAR(rig.c.contact.stiffness * overlap / weight, 1, 1e-9) << "K " << coefficient;
     EXPECT_LT(std::abs(rig.stage.mean_drag()[0][1]), 1e-9 * weight);
   }
 }
@@ -335,18 +334,18 @@ TEST(ContactDrag, MeanIsTheImpulseThatTheGrainReallyFelt) {
   rig.outer[0].coefficient = 0.7;
   const V2 before = rig.grains.velocity[0];
   rig.advance();
-  const V2 change = rig.c.grain_mass * (rig.grains.velocity[0] - before);
+  const V2 change = rig.disc().mass * (rig.grains.velocity[0] - before);
   const V2 felt = rig.c.dt * (rig.stage.mean_drag()[0] + rig.outer[0].force);
-  EXPECT_LT((change - felt).norm(), 1e-14 * rig.c.grain_mass);
+  EXPECT_LT((change - felt).norm(), 1e-14 * rig.disc().mass);
 }
 
 /// A disc resting on the floor, pushed sideways through its centre with `push` times mu N.
 Rig pushed(double push, int steps) {
   Rig rig;
-  const double weight = 9.81 * rig.c.grain_mass;
+  const double weight = 9.81 * rig.disc().mass;
   rig.walls = {floor_plane()};
-  rig.add({0, rig.c.radius - weight / rig.c.stiffness}, V2::Zero(), 0,
-          {push * rig.c.friction * weight, -weight});
+  rig.add({0, rig.disc().radius - weight / rig.c.contact.stiffness}, V2::Zero(), 0,
+          {push * rig.c.contact.friction * weight, -weight});
   for (int n = 0; n < steps; ++n) rig.advance();
   return rig;
 }
@@ -356,38 +355,39 @@ TEST(ContactFriction, ADiscPushedBelowTheLimitRollsWithoutSliding) {
   Rig rig = pushed(2.9, 200);
   const double t = 200 * rig.c.dt;
   const double push = rig.outer[0].force[0];
-  EXPECT_NEAR(rig.grains.velocity[0][0] / (2.0 / 3 * push * t / rig.c.grain_mass), 1, 5e-3);
-  EXPECT_NEAR(rig.grains.spin[0][0] * rig.c.radius / rig.grains.velocity[0][0], -1, 5e-3);
+  EXPECT_NEAR(rig.grains.velocity[0][0] / (2.0 / 3 * push * t / rig.disc().mass), 1, 5e-3);
+  EXPECT_NEAR(rig.grains.spin[0][0] * rig.disc().radius / rig.grains.velocity[0][0], -1, 5e-3);
   EXPECT_EQ(rig.stage.records().at(0).friction_loss, 0);
   // The spring carries that third and does not grow while the disc rolls on.
-  EXPECT_NEAR(rig.c.tangential_stiffness * rig.contacts.spring[0][0] / (push / 3), 1, 2e-2);
+  EXPECT_NEAR(rig.c.contact.stiffness / 3 * rig.contacts.spring[0][0] / (push / 3), 1, 2e-2);
 }
 
 TEST(ContactFriction, ADiscPushedAboveTheLimitSlidesWithCoulombsForce) {
   Rig rig = pushed(4.0, 200);
   const double t = 200 * rig.c.dt;
   const double limit = rig.outer[0].force[0] / 4;
-  EXPECT_NEAR(rig.grains.velocity[0][0] / (3 * limit * t / rig.c.grain_mass), 1, 5e-3);
-  EXPECT_NEAR(-rig.grains.spin[0][0] / (limit * rig.c.radius * t / rig.c.grain_inertia), 1, 5e-3);
+  EXPECT_NEAR(rig.grains.velocity[0][0] / (3 * limit * t / rig.disc().mass), 1, 5e-3);
+  const double turned = limit * rig.disc().radius * t / rig.disc().inertia;
+  EXPECT_NEAR(-rig.grains.spin[0][0] / turned, 1, 5e-3);
   EXPECT_GT(rig.stage.records().at(0).friction_loss, 0);
   EXPECT_NEAR(rig.stage.records()[0].impulse[0] / (-limit * rig.c.dt), 1, 1e-6);
 }
 
 TEST(ContactFriction, ASlidingDiscRollsInTheEndWithTwoThirdsOfItsSpeed) {
   Rig rig;
-  const double weight = 9.81 * rig.c.grain_mass, speed = 0.1;
+  const double weight = 9.81 * rig.disc().mass, speed = 0.1;
   rig.walls = {floor_plane()};
-  rig.add({0, rig.c.radius - weight / rig.c.stiffness}, {speed, 0}, 0, {0, -weight});
-  const double until = speed / (3 * rig.c.friction * 9.81);  // then it rolls
+  rig.add({0, rig.disc().radius - weight / rig.c.contact.stiffness}, {speed, 0}, 0, {0, -weight});
+  const double until = speed / (3 * rig.c.contact.friction * 9.81);  // then it rolls
   const int steps = static_cast<int>(3 * until / rig.c.dt);
   for (int n = 0; n < steps; ++n) rig.advance();
   EXPECT_NEAR(rig.grains.velocity[0][0] / speed, 2.0 / 3, 5e-3);
-  EXPECT_NEAR(rig.grains.spin[0][0] * rig.c.radius / speed, -2.0 / 3, 5e-3);
+  EXPECT_NEAR(rig.grains.spin[0][0] * rig.disc().radius / speed, -2.0 / 3, 5e-3);
 }
 
 TEST(ContactFriction, WithoutFrictionNothingTurns) {
   Rig rig = pushed(0, 1);
-  rig.c.friction = 0;
+  rig.c.contact.friction = 0;
   rig.grains.velocity[0] = {0.1, 0};
   rig.grains.spin[0].setZero();
   for (int n = 0; n < 100; ++n) rig.advance();
@@ -399,35 +399,35 @@ TEST(ContactFriction, ALongRestDoesNotCreep) {
   // Nothing pushes it along the floor: only rounding could move it.
   Rig rig = pushed(0, 1);
   for (int n = 0; n < 20000; ++n) rig.advance();
-  EXPECT_LT(std::abs(rig.grains.position[0][0]), 1e-3 * rig.c.diameter);
-  EXPECT_LT(rig.contacts.spring[0].norm(), 1e-6 * rig.c.diameter);
+  EXPECT_LT(std::abs(rig.grains.position[0][0]), 1e-3 * rig.disc().diameter);
+  EXPECT_LT(rig.contacts.spring[0].norm(), 1e-6 * rig.disc().diameter);
 }
 
 TEST(ContactFriction, GrossSlidingObliqueImpactFollowsTheRigidBodySolution) {
   // e_t = 1 - mu (1 + e) / tan(theta), omega = 2 mu (1 + e) V_n / R for a disc (Chung and Ooi 2011,
   // test 4, in two dimensions). The clipped dashpot makes e_n; friction follows the real N.
   Rig rig;
-  rig.c.friction = 0.092;
-  rig.c.damping = 0.02;
+  rig.c.contact.friction = 0.092;
+  rig.c.contact.damping = 0.02;
   rig.c.substeps = 400;
   rig.walls = {floor_plane()};
   const double normal = 0.1, along = 0.2;  // 63 degrees from the normal
-  rig.add({0, rig.c.radius + 1e-7}, {along, -normal});
+  rig.add({0, rig.disc().radius + 1e-7}, {along, -normal});
   for (int n = 0; n < 4; ++n) rig.advance();
   ASSERT_EQ(rig.contacts.size(), 0u);
   const double e = rig.grains.velocity[0][1] / normal;
   EXPECT_NEAR(rig.grains.velocity[0][0] / along, 1 - 0.092 * (1 + e) * normal / along, 2e-3);
-  EXPECT_NEAR(-rig.grains.spin[0][0] / (2 * 0.092 * (1 + e) * normal / rig.c.radius), 1, 2e-2);
+  EXPECT_NEAR(-rig.grains.spin[0][0] / (2 * 0.092 * (1 + e) * normal / rig.disc().radius), 1, 2e-2);
 }
 
 // ---- records ----
 
 TEST(ContactRecords, TellBeginEndPeakAndImpulseOfAnElasticImpact) {
   Rig rig;
-  rig.c.damping = 0;
+  rig.c.contact.damping = 0;
   rig.c.dt /= 8;  // the contact spans several steps
   rig.walls = {floor_plane()};
-  rig.add({0, rig.c.radius + 1e-7}, {0, -0.2});
+  rig.add({0, rig.disc().radius + 1e-7}, {0, -0.2});
   int begins = 0, ends = 0, rows = 0;
   double peak = 0, overlap = 0, rebound = 0, impact = 0;
   V2 impulse = V2::Zero();
@@ -451,7 +451,7 @@ TEST(ContactRecords, TellBeginEndPeakAndImpulseOfAnElasticImpact) {
   EXPECT_EQ(begins, 1);
   EXPECT_EQ(ends, 1);
   EXPECT_GE(rows, 8);
-  const double m = rig.c.grain_mass, k = rig.c.stiffness;
+  const double m = rig.disc().mass, k = rig.c.contact.stiffness;
   EXPECT_NEAR(impact, 0.2, 1e-12);
   EXPECT_NEAR(rebound, rig.grains.velocity[0][1], 1e-12);
   EXPECT_NEAR(peak / (0.2 * std::sqrt(m * k)), 1, 1e-2);
@@ -463,12 +463,12 @@ TEST(ContactRecords, TellBeginEndPeakAndImpulseOfAnElasticImpact) {
 TEST(ContactRecords, ImpulseIsOnTheFirstGrainOfTheKeyAndKeysAscend) {
   Rig rig;
   rig.walls = {floor_plane()};
-  const double d = rig.c.diameter;
+  const double d = rig.disc().diameter;
   // Two discs on the floor and against each other, a third on top of both.
   rig.add({0, 0.4995 * d}, V2::Zero());
   rig.add({0.999 * d, 0.4995 * d}, V2::Zero());
   rig.add({0.4995 * d, 0.4995 * d + 0.86 * d}, V2::Zero());
-  const double m = rig.c.grain_mass;
+  const double m = rig.disc().mass;
   rig.advance();
   std::vector<ContactKey> keys;
   std::vector<V2> gained(3, V2::Zero());
@@ -492,7 +492,7 @@ TEST(ContactRecords, AContactWithinOneStepHasBothItsBeginAndItsEndThere) {
   rig.c.dt = 5e-3;
   rig.c.substeps = 300;
   rig.walls = {floor_plane()};
-  rig.add({0, rig.c.radius + 1e-4}, {0, -0.5});
+  rig.add({0, rig.disc().radius + 1e-4}, {0, -0.5});
   const std::uint64_t builds = rig.stage.list_builds();
   rig.advance();
   EXPECT_GT(rig.stage.list_builds(), builds + 1);
@@ -500,13 +500,13 @@ TEST(ContactRecords, AContactWithinOneStepHasBothItsBeginAndItsEndThere) {
   EXPECT_TRUE(rig.stage.records()[0].begin);
   EXPECT_TRUE(rig.stage.records()[0].end);
   EXPECT_EQ(rig.contacts.size(), 0u);
-  EXPECT_GT(rig.grains.position[0][1], 1.1 * rig.c.diameter);
+  EXPECT_GT(rig.grains.position[0][1], 1.1 * rig.disc().diameter);
 }
 
 TEST(ContactRecords, ADiscInTheAirHasNone) {
   Rig rig;
   rig.walls = {floor_plane()};
-  rig.add({0, 1.01 * rig.c.radius}, V2::Zero());
+  rig.add({0, 1.01 * rig.disc().radius}, V2::Zero());
   rig.advance();
   EXPECT_EQ(rig.stage.records().size(), 0u);
 }
@@ -538,10 +538,10 @@ TEST(ContactBits, DampingMattersFromTheFirstContactOnAndNotBefore) {
   Rig soft, hard;
   for (Rig* rig : {&soft, &hard}) {
     rig->walls = {floor_plane()};
-    rig->add({0, 2 * rig->c.radius}, {0, -0.2}, 0, {0, -9.81 * rig->c.grain_mass});
+    rig->add({0, 2 * rig->c.species[0].radius}, {0, -0.2}, 0, {0, -9.81 * rig->c.species[0].mass});
   }
-  soft.c.damping = 0.2;
-  hard.c.damping = 0.25;
+  soft.c.contact.damping = 0.2;
+  hard.c.contact.damping = 0.25;
   for (int n = 0; n < 100; ++n) {
     soft.advance();
     hard.advance();
@@ -562,7 +562,7 @@ TEST(ContactPeriodic, TwoDiscsAcrossTheSeamFeelWhatTwoInTheMiddleFeel) {
     rig->c.period.length[0] = length;
     rig->c.dt /= 4;
   }
-  const double d = middle.c.diameter, x = 0.125;
+  const double d = middle.c.species[0].diameter, x = 0.125;
   middle.add({x, 0}, {0.1, 0});
   middle.add({x + d * 0.999, 0}, {-0.1, 0});
   seam.add({x + 0.125 - d * 0.4995, 0}, {0.1, 0});
@@ -590,9 +590,9 @@ TEST(ContactExtremes, CoincidentDiscsPartAlongXAndStayFinite) {
 TEST(ContactExtremes, AnOverlapBeyondTheGuardIsAnErrorThatNamesTheGrain) {
   Rig rig;
   rig.walls = {floor_plane()};
-  rig.limit = 0.01 * rig.c.diameter;
+  rig.limit = 0.01;
   rig.add({0.1, 0.1}, V2::Zero());
-  rig.add({0, rig.c.radius}, {0, -5.0});
+  rig.add({0, rig.disc().radius}, {0, -5.0});
   try {
     for (int n = 0; n < 10; ++n) rig.advance();
     FAIL() << "no guard";
@@ -601,18 +601,18 @@ TEST(ContactExtremes, AnOverlapBeyondTheGuardIsAnErrorThatNamesTheGrain) {
     EXPECT_EQ(failure.field, "grains.position");
     EXPECT_EQ(failure.id, 1u);
     EXPECT_EQ(failure.step, rig.step);
-    EXPECT_GT(failure.value, rig.limit);
-    EXPECT_EQ(failure.limit, rig.limit);
+    EXPECT_GT(failure.value, 0.01 * rig.disc().diameter);
+    EXPECT_EQ(failure.limit, 0.01 * rig.disc().diameter);
     EXPECT_FALSE(failure.advice.empty());
   }
 }
 
 TEST(ContactModules, WithoutRotationNothingTangentialIsThere) {
   Rig rig;
-  rig.c.rotation = false;
+  rig.c.contact.rotation = false;
   rig.c.dt /= 100;
   rig.walls = {floor_plane()};
-  rig.add({0, 0.999 * rig.c.radius}, {0.1, 0});
+  rig.add({0, 0.999 * rig.disc().radius}, {0.1, 0});
   rig.grains.spin.clear();
   rig.advance();
   ASSERT_EQ(rig.contacts.key.size(), 1u);

@@ -25,14 +25,12 @@ struct Bed {
 
   explicit Bed(Porosity form) {
     c.spacing = 1e-3;
-    c.diameter = 2.5e-3;
-    c.radius = 0.5 * c.diameter;
-    c.grain_volume = 0.25 * pi * c.diameter * c.diameter;
+    c.species = {species_constants<2>(2.5e-3, 1250)};
     c.reference_density = 1000;
     c.viscosity = 0.01;
     c.coupled = c.two_way = c.conjugate_pressure = true;
     c.conservative_porosity = form == Porosity::conservative;
-    c.coupling_length = c.diameter;
+    c.coupling_length = c.species[0].diameter;
     c.porosity_floor = 0.1;
     constexpr std::size_t n = 20;
     for (std::size_t a = 0; a < n * n; ++a) {
@@ -48,6 +46,7 @@ struct Bed {
     const V2 places[] = {{9.3e-3, 9.1e-3}, {11.9e-3, 9.6e-3}, {1.5e-3, 1.4e-3}};
     for (const V2& x : places) {
       state.grains.id.push_back(state.grains.size());
+      state.grains.species.push_back(0);
       state.grains.position.push_back(x);
       state.grains.velocity.emplace_back(V2::Zero());
     }
@@ -127,7 +126,7 @@ TEST(CouplingConjugate, AnEvenPressureExertsNothing) {
     Bed bed(form);
     bed.pressure.assign(bed.pressure.size(), 370.0);
     bed.evaluate();
-    const double scale = 370 * bed.c.diameter;
+    const double scale = 370 * bed.c.species[0].diameter;
     for (const GrainForce<2>& f : bed.stage.grain_forces())
       EXPECT_LT(f.pressure.norm(), 1e-12 * scale);
     for (std::size_t a = 0; a < bed.volume.size(); ++a) {

@@ -29,13 +29,11 @@ struct Bed {
 
   Bed(std::size_t nx, std::size_t ny, double dx = 1e-3) {
     c.spacing = dx;
-    c.diameter = 2.5e-3;
-    c.radius = 0.5 * c.diameter;
-    c.grain_volume = 0.25 * pi * c.diameter * c.diameter;
+    c.species = {species_constants<2>(2.5e-3, 1250)};
     c.reference_density = 1000;
     c.viscosity = 0.01;
     c.coupled = c.two_way = true;
-    c.coupling_length = c.diameter;
+    c.coupling_length = c.species[0].diameter;
     c.porosity_floor = 0.3;
     for (std::size_t j = 0; j < ny; ++j)
       for (std::size_t i = 0; i < nx; ++i) {
@@ -49,6 +47,7 @@ struct Bed {
   }
   void add(V2 x, V2 v = V2::Zero()) {
     state.grains.id.push_back(state.grains.size());
+    state.grains.species.push_back(0);
     state.grains.position.push_back(x);
     state.grains.velocity.push_back(v);
   }
@@ -95,7 +94,7 @@ std::pair<double, double> packed(const std::vector<V2>& cell, double width, doub
                                  double hc_over_d, int repeat_x, int repeat_y) {
   const double lx = width * repeat_x, ly = height * repeat_y;
   Bed bed(0, 0);
-  bed.c.coupling_length = hc_over_d * bed.c.diameter;
+  bed.c.coupling_length = hc_over_d * bed.c.species[0].diameter;
   bed.c.porosity_floor = 0.01;
   bed.c.period.length[0] = lx;
   bed.c.period.length[1] = ly;
@@ -158,7 +157,7 @@ TEST(CouplingPorosity, HandsOutAGrainsWholeVolumeToTheFluidInsideTheWalls) {
       bed.walls = box_walls(30e-3);
       bed.add(place);
       bed.find_forces();
-      EXPECT_NEAR(bed.solid() / bed.c.grain_volume, 1, conservative ? 1e-12 : 2e-3)
+      EXPECT_NEAR(bed.solid() / bed.c.species[0].volume, 1, conservative ? 1e-12 : 2e-3)
           << place.transpose() << (conservative ? ", conservative" : "");
       EXPECT_NEAR(bed.force().weight, 1, 2e-3) << place.transpose();
     }
@@ -169,7 +168,7 @@ TEST(CouplingPorosity, WithoutImagesAWallTakesItsShare) {
   Bed bed(30, 30);
   bed.add({15.2e-3, 0});
   bed.find_porosity();
-  EXPECT_NEAR(bed.solid() / bed.c.grain_volume, 0.5, 5e-3);
+  EXPECT_NEAR(bed.solid() / bed.c.species[0].volume, 0.5, 5e-3);
 }
 
 TEST(CouplingPorosity, IsLevelAcrossAWall) {
@@ -225,7 +224,7 @@ TEST(CouplingPorosity, FeltInAPackedArrayIsNearThatOfTheArray) {
   // the array's 0.2146 comes back.
   Bed bed(40, 40);
   bed.c.porosity_floor = 0.01;
-  const double d = bed.c.diameter;
+  const double d = bed.c.species[0].diameter;
   for (int j = 0; j < 7; ++j)
     for (int i = 0; i < 7; ++i) bed.add({0.02 + (i - 3) * d, 0.02 + (j - 3) * d});
   bed.find_forces();
@@ -233,7 +232,7 @@ TEST(CouplingPorosity, FeltInAPackedArrayIsNearThatOfTheArray) {
   for (int j = -2; j <= 2; ++j)
     for (int i = -2; i <= 2; ++i)
       if (i != 0 || j != 0)
-        solid += bed.c.grain_volume * wendland(d, d * std::sqrt(i * i + j * j));
+        solid += bed.c.species[0].volume * wendland(d, d * std::sqrt(i * i + j * j));
   const GrainForce<2>& middle = bed.force(24);
   EXPECT_NEAR(middle.porosity, 1 - solid / (1 - 7.0 / 16), 1e-12);
   EXPECT_LT(middle.porosity, 0.5);
@@ -253,7 +252,7 @@ TEST(CouplingForces, AUniformFlowIsSampledExactlyWhereverTheGrainIs) {
     const double speed = std::sqrt(0.02 * 0.02 + 0.09 * 0.09);
     EXPECT_NEAR(bed.force().coefficient,
                 drag_coefficient<2>(make_drag_law<2>(Drag::dallavalle_di_felice),
-                                    {speed, 1.0, bed.c.diameter, 1000, 0.01}),
+                                    {speed, 1.0, bed.c.species[0].diameter, 1000, 0.01}),
                 1e-12);
   }
 }
@@ -265,7 +264,7 @@ TEST(CouplingForces, AUniformPressureGradientPushesWithTheGrainsVolume) {
     for (std::size_t a = 0; a < bed.stress.size(); ++a) bed.stress[a] = bed.volume[a] * per_volume;
     bed.add(place);
     bed.find_forces();
-    const V2 expected = bed.c.grain_volume * per_volume;
+    const V2 expected = bed.c.species[0].volume * per_volume;
     EXPECT_LT((bed.force().hydrodynamic - expected).norm(), 1e-13 * expected.norm());
   }
 }

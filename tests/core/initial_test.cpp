@@ -268,6 +268,7 @@ Ripple packed_porosity(double hc, double row_height, double shift) {
   for (int j = -9; j <= 9; ++j)
     for (int i = -9; i <= 9; ++i) {
       state.grains.id.push_back(state.grains.size());
+      state.grains.species.push_back(0);
       state.grains.position.emplace_back(12 + i + (j % 2 ? shift : 0), 12 + j * row_height);
       state.grains.velocity.push_back(Vec<double, 2>::Zero());
     }
