@@ -110,6 +110,55 @@ TEST_F(VerifyVerb, RotInTheMiddleLosesStepsAndSaysWhich) {
   EXPECT_GT(read, 0u);
 }
 
+TEST_F(VerifyVerb, ATornTailAndRotAreToldApart) {
+  // The last bytes missing: nothing says that they were ever durable. A byte changed in the middle:
+  // what stands behind it was written after it had been synced.
+  const std::string bytes = read_file(path_);
+  const std::string torn = folder_.write("torn.varve", bytes.substr(0, bytes.size() - 9));
+  const auto tail = verify(torn, 4);
+  EXPECT_EQ(tail["verdict"], "torn");
+  EXPECT_EQ(tail["file_bytes"], std::to_string(bytes.size() - 9));
+  ASSERT_EQ(tail["damage"].size(), 1u);
+  EXPECT_THAT(tail["damage"][0]["what"].get<std::string>(), HasSubstr("torn tail of "));
+  // What was checked ends where the torn tail begins.
+  EXPECT_EQ(tail["bytes_checked"], tail["damage"][0]["offset"].dump());
+  EXPECT_EQ(tail["steps"], "41");
+
+  const std::string rotten = spoilt(fs::file_size(path_) / 2);
+  const auto rot = verify(rotten, 4);
+  EXPECT_EQ(rot["verdict"], "damaged");
+  EXPECT_LT(std::stoull(rot["bytes_checked"].get<std::string>()), bytes.size());
+  EXPECT_LE(std::stoull(rot["damage"][0]["step_from"].get<std::string>()),
+            std::stoull(rot["damage"][0]["step_to"].get<std::string>()));
+
+  const auto text = run_command({"varve-verify", torn});
+  EXPECT_THAT(text.output, HasSubstr("torn: " + tail["bytes_checked"].get<std::string>() + " of " +
+                                     std::to_string(bytes.size() - 9) + " bytes checked"));
+  EXPECT_THAT(run_command({"varve-verify", rotten}).output, HasSubstr("can't be read"));
+  EXPECT_THAT(run_command({"varve-info", torn}).code, 0) << "readers go on with what is whole";
+}
+
+TEST_F(VerifyVerb, ALossyRecoveryExitsWithFourAndListsWhatIsLost) {
+  const std::string out = folder_ / "saved.varve";
+  const std::string rotten = spoilt(fs::file_size(path_) / 2);
+  const auto result = run_command({"varve-recover", rotten, "-o", out});
+  EXPECT_EQ(result.code, 4) << result.errors;
+  EXPECT_THAT(result.output, HasSubstr("  lost: step"));
+  EXPECT_THAT(result.output, HasSubstr("  offset "));
+  const auto json = nlohmann::json::parse(
+      run_command({"varve-recover", rotten, "-o", out, "--overwrite", "--json"}).output);
+  ASSERT_EQ(json["lost"].size(), 1u);
+  const auto from = json["lost"][0]["from"].get<std::string>();
+  const auto to = json["lost"][0]["to"].get<std::string>();
+  EXPECT_THAT(result.output, HasSubstr(from == to ? "step " + from : from + " to " + to));
+  // What was saved names its gap: it is complete, and lossless to recover again.
+  EXPECT_EQ(verify(out, 0)["verdict"], "complete");
+  const std::string before = read_file(out);
+  EXPECT_EQ(run_command({"varve-recover", out, "-o", folder_ / "twice.varve"}).code, 4)
+      << "the gap is still one";
+  EXPECT_EQ(read_file(out), before);
+}
+
 TEST_F(VerifyVerb, WrongInputsHaveTheirExitCodes) {
   EXPECT_EQ(run_command({"varve-verify", folder_ / "missing"}).code, 2);
   EXPECT_EQ(run_command({"varve-verify", folder_.path()}).code, 2);
