@@ -96,6 +96,14 @@ std::vector<Scene> scenes() {
   dry.grains.jitter = 0.001;
   core::Scenario pipe = with_grains(box(0.02, 0.02), 3, 3, 4e-3, 0.05);
   pipe.domain.sides = core::Boundary::periodic;
+  core::Scenario floats = column, mixed = disc;
+  core::Scenario space = with_grains(box(8e-3, 8e-3), 1, 2, 1.3e-3, 0.05);
+  floats.precision = core::Precision::float_;
+  mixed.precision = core::Precision::mixed;
+  space.domain.dimension = 3;
+  space.domain.depth = 8e-3;
+  core::Scenario space_floats = space;
+  space_floats.precision = core::Precision::float_;
   return {
       {.name = "disc", .scenario = disc},
       {.name = "column", .scenario = column},
@@ -105,6 +113,10 @@ std::vector<Scene> scenes() {
       {.name = "widths", .scenario = column, .changes = {
           {20, {{"domain.width", "0.024"}, {"contact.damping", "0.3"}}},
           {40, {{"domain.width", "0.022"}}}}},
+      {.name = "floats", .scenario = floats, .steps = 30},
+      {.name = "mixed", .scenario = mixed, .steps = 30},
+      {.name = "space", .scenario = space, .steps = 20},
+      {.name = "spacef", .scenario = space_floats, .steps = 20},
   };
 }
 
