@@ -44,6 +44,12 @@ TEST(FloatingPoint, ProductsAndSumsAreRoundedOneByOne) {
   EXPECT_EQ(contraction_residue_float(), 0);
 }
 
+TEST(FloatingPoint, ConversionsToFloatAreNotTakenForNothing) {
+  const double first = 1.0 / 3, second = -1.0 / 7;
+  EXPECT_EQ(narrowing_residue(), (first - static_cast<double>(0.3333333433f)) *
+                                     (second - static_cast<double>(-0.1428571492f)));
+}
+
 TEST(FloatingPoint, NotFusedWhereTheTargetHasFusedInstructions) {
   if (!has_fma()) GTEST_SKIP() << "this CPU has no fused multiply-add";
   EXPECT_EQ(fma_target_residue(), 0);
