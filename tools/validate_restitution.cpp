@@ -9,13 +9,13 @@
 namespace varve::tools {
 namespace {
 
-/// The benchmark's disc thrown at the floor from 0.4 d above it, without gravity when dry.
+/// The benchmark's disc thrown at the floor from 0.005 d above it, without gravity when dry.
 core::Scenario thrown(bool wet, double alpha, double speed, double contact_time) {
   core::Scenario s;
   s.domain.width = s.domain.height = 0.02;
   s.grains.rows = s.grains.columns = 1;
   s.grains.density = 1250;
-  s.grains.lowest_y = 0.9 * s.grains.diameter;
+  s.grains.lowest_y = 0.505 * s.grains.diameter;
   s.grains.velocity_y = -speed;
   s.contact.time = contact_time;
   s.contact.damping = alpha;
