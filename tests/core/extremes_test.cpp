@@ -362,6 +362,73 @@ TEST(Extremes, X25WithoutGravityAndWallsMomentumIsKept) {
   EXPECT_NEAR(after[1], before[1], 1e-12 * scale);
 }
 
+/// A tank half full under a free surface, one grain above it.
+Scenario above_the_surface() {
+  Scenario s = closed_box(0.02, 0.03);
+  s.domain.top = Boundary::free;
+  s.fluid.level = 0.012;
+  s.fluid.sound_speed = 8;
+  s.grains.rows = s.grains.columns = 1;
+  s.grains.lowest_y = 0.022;
+  return s;
+}
+
+TEST(Extremes, X2AGrainWithoutFluidAroundItFallsFreelyAndEntersWithoutAJump) {
+  const auto simulation = started(above_the_surface());
+  const double dt = simulation->clock().dt, radius = 1.25e-3, reach = 5e-3;
+  double before = 0, largest = 0;
+  while (field(*simulation, "grains.position")[1] > 0.012 - radius) {
+    simulation->advance();
+    const double y = field(*simulation, "grains.position")[1],
+                 v = field(*simulation, "grains.velocity")[1];
+    if (y > 0.012 + reach + 1e-3) {
+      EXPECT_NEAR(v, -9.81 * simulation->clock().time, 1e-12);
+    }
+    largest = std::max(largest, std::abs((v - before) / dt + 9.81));
+    before = v;
+  }
+  // The fluid takes hold of it over many steps: no step sees more than a few times its weight.
+  EXPECT_LT(largest, 5 * 9.81);
+  EXPECT_TRUE(all_finite(*simulation));
+}
+
+TEST(Extremes, X28AGrainThrownOutThroughAnOpenTopComesBack) {
+  Scenario s = above_the_surface();
+  s.grains.velocity_y = 0.6;  // to 1.8 cm above where it starts, 1 cm beyond the domain
+  const auto simulation = started(s);
+  double highest = 0;
+  while (simulation->clock().time < 0.14) {
+    simulation->advance();
+    highest = std::max(highest, field(*simulation, "grains.position")[1]);
+  }
+  EXPECT_GT(highest, 0.035);
+  EXPECT_LT(field(*simulation, "grains.position")[1], 0.03);
+  EXPECT_TRUE(all_finite(*simulation));
+}
+
+TEST(Extremes, X30AnImpactTooFastForItsStiffnessIsStopped) {
+  Scenario s = one_grain(2500);
+  s.fluid.viscosity = 1e-3;
+  s.fluid.sound_speed = 20;
+  s.grains.lowest_y = 2e-3;
+  s.grains.velocity_y = -3;
+  s.contact.time = 5e-3;  // overlaps of about v t / pi
+  const auto simulation = started(s);
+  try {
+    advance_to(*simulation, 0.01);
+    FAIL() << "not stopped";
+  } catch (const NumericalFailure& failure) {
+    EXPECT_EQ(failure.criterion, "overlap");
+    EXPECT_EQ(failure.id, 0u);
+    EXPECT_GT(failure.value, failure.limit);
+  }
+  // Ten times as stiff in time it holds.
+  s.contact.time = 0.2e-3;
+  const auto stiff = started(s);
+  advance_to(*stiff, 0.003);
+  EXPECT_TRUE(all_finite(*stiff));
+}
+
 // ---- changes while a run lasts ----
 
 /// The damped column, some steps after its grains have touched.
