@@ -43,7 +43,7 @@ std::vector<const ValidationCase*> all_cases() {
 }
 
 INSTANTIATE_TEST_SUITE_P(Cases, ValidateGate, testing::ValuesIn(all_cases()),
-                         [](const auto& info) { return info.param->name; });
+                         [](const auto& given) { return given.param->name; });
 
 TEST(ValidateVerdict, ComparesTheDeviationWithTheTolerance) {
   EXPECT_EQ(relative_row("a", "", 2, 2.019, 0.01).verdict(), Verdict::pass);
