@@ -59,6 +59,7 @@ bool read_unit(std::string_view text, Quantity& quantity, int& tens, double& fac
   constexpr int power_max = 9;
   int sign = 1;
   std::size_t atoms = 0;
+  if (text.starts_with("1/")) text.remove_prefix(1);
   while (!text.empty()) {
     if (atoms > 0 || text.front() == '/') {
       bool separated = false;

@@ -102,8 +102,9 @@ TEST(ParameterTable, WhatAForkMayChange) {
     }
   }
   const std::set<std::string_view> expected{
-      "contact.damping", "contact.stiffness", "contact.friction", "fluid.viscosity",
-      "gravity.magnitude", "gravity.tilt", "domain.width", "time.dt", "time.until", "time.steps"};
+      "contact.damping",   "contact.stiffness", "contact.friction", "contact.youngs_modulus",
+      "fluid.viscosity",   "gravity.magnitude", "gravity.tilt",     "domain.width",
+      "time.dt",           "time.until",        "time.steps"};
   EXPECT_EQ(changeable, expected);
 }
 

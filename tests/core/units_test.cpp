@@ -51,6 +51,7 @@ TEST(Units, ProductsAndPowersGiveTheirDimension) {
   EXPECT_EQ(dimension_of("10 mPa s"), (Dimension{1, -1, -1}));
   EXPECT_EQ(dimension_of("10 mPa*s"), (Dimension{1, -1, -1}));
   EXPECT_EQ(dimension_of("9.81 m/s2"), (Dimension{0, 1, -2}));
+  EXPECT_EQ(dimension_of("3 1/s"), (Dimension{0, 0, -1}));
   EXPECT_EQ(dimension_of("9.81 m/s^2"), (Dimension{0, 1, -2}));
   EXPECT_EQ(dimension_of("9.81 m s^-2"), (Dimension{0, 1, -2}));
   EXPECT_EQ(dimension_of("3 kN/m"), (Dimension{1, 0, -2}));

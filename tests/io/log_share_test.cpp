@@ -250,7 +250,8 @@ TEST_F(LogShare, ReadersFollowAGrowingLog) {
       std::uint64_t last = 0;
       while (last < options_.steps) {
         const std::uint64_t before = reader->last_step();
-        EXPECT_EQ(reader->refresh(), reader->last_step() > before);
+        const bool more = reader->refresh();
+        EXPECT_EQ(more, reader->last_step() > before);
         ASSERT_NE(reader->completeness(), Completeness::damaged);
         for (std::uint64_t step = last + 1; step <= reader->last_step(); ++step) {
           const auto frame = reader->frame(step);

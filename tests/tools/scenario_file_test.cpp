@@ -76,7 +76,7 @@ TEST(ScenarioFile, AllErrorsAtOnceWithTheirPlaces) {
           "bad.cfg:14:1: error: 'contact.stiffness' was already set on line 8",
           "bad.cfg:16:8: error: grains.rows: '2.5' is not a whole number; expected a whole number "
           "0..1000000000",
-          "bad.cfg:17:10: error: grains.motion: 'fixed' is not known; expected free or frozen",
+          "bad.cfg:17:10: error: grains.motion: 'fixed' is not known; expected free, frozen or driven",
           "bad.cfg:18:1: error: expected 'key = value', got 'just some words'",
           "bad.cfg:19:1: error: expected 'key = value', got '= 3'"));
 }
@@ -97,7 +97,7 @@ TEST(ScenarioFile, BadSections) {
                           HasSubstr("bad.cfg:10:11: error: fluid.spacing: 'x' is not a number"),
                           HasSubstr("bad.cfg:11:1: error: unknown section 'zzz'; expected one of "
                                     "scenario, domain, gravity, fluid, grains, contact, coupling, "
-                                    "time, guards, record, event.NAME")));
+                                    "time, guards, record, species.NAME, event.NAME")));
 }
 
 TEST(ScenarioFile, KeysOutsideASection) {
