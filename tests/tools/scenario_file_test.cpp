@@ -76,7 +76,8 @@ TEST(ScenarioFile, AllErrorsAtOnceWithTheirPlaces) {
           "bad.cfg:14:1: error: 'contact.stiffness' was already set on line 8",
           "bad.cfg:16:8: error: grains.rows: '2.5' is not a whole number; expected a whole number "
           "0..1000000000",
-          "bad.cfg:17:10: error: grains.motion: 'fixed' is not known; expected free, frozen or driven",
+          "bad.cfg:17:10: error: grains.motion: 'fixed' is not known; expected free, frozen or "
+          "driven",
           "bad.cfg:18:1: error: expected 'key = value', got 'just some words'",
           "bad.cfg:19:1: error: expected 'key = value', got '= 3'"));
 }
