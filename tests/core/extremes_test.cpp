@@ -418,7 +418,7 @@ TEST(Extremes, X30AnImpactTooFastForItsStiffnessIsStopped) {
     advance_to(*simulation, 0.01);
     FAIL() << "not stopped";
   } catch (const NumericalFailure& failure) {
-    EXPECT_EQ(failure.criterion, "overlap");
+    EXPECT_THAT(failure.criterion, HasSubstr("overlap"));
     EXPECT_EQ(failure.id, 0u);
     EXPECT_GT(failure.value, failure.limit);
   }
