@@ -14,14 +14,13 @@
 
 #include "io/log_reader.h"
 #include "tools/analysis.h"
+#include "tools/analysis_json.h"
 #include "tools/cli.h"
 #include "tools/simulation_engine.h"
 #include "tools/steps.h"
 
 namespace varve::tools {
 namespace {
-
-using Json = nlohmann::ordered_json;
 
 /// Files (or standard output) that tables go to. A table that can't be written whole is an error,
 /// never a shorter file that looks like one.
@@ -159,51 +158,6 @@ std::vector<double> points_asked_for(const Invocation& invocation,
   return points;
 }
 
-Json json_of(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
-
-Json json_of(const io::LogReader& log, const AnalysisSummary& s) {
-  Json out{{"schema", "varve.analyze/1"},
-           {"run", log.path()},
-           {"steps", {{"first", std::to_string(s.first_step)},
-                      {"last", std::to_string(s.last_step)},
-                      {"stride", std::to_string(s.stride)},
-                      {"states", std::to_string(s.states)}}},
-           {"time_s", {{"first", s.first_time}, {"last", s.last_time}}},
-           {"grains", s.grains}};
-  Json settling;
-  if (s.settling) {
-    const core::Window& w = *s.settling;
-    settling = {{"terminal_speed_m_s", w.mean},
-                {"deviation_m_s", w.deviation},
-                {"window_s", {w.from, w.to}},
-                {"window_rule", s.window_rule},
-                {"drift_m_s", w.drift},
-                {"stationary", w.stationary},
-                {"acceleration_time_s", json_of(s.acceleration_time)},
-                {"peak_speed_m_s", s.peak_speed},
-                {"peak_time_s", s.peak_time},
-                {"turning_points", s.turns.size()}};
-    settling["amplitude_m_s"] = s.oscillation ? Json(s.oscillation->amplitude) : Json();
-    settling["period_s"] = s.oscillation ? Json(s.oscillation->period) : Json();
-  }
-  out["settling"] = std::move(settling);
-  out["contacts"] = {{"first_s", json_of(s.first_contact)},
-                     {"first_floor_s", json_of(s.first_floor_contact)},
-                     {"between_grains", s.collisions},
-                     {"with_walls", s.wall_collisions},
-                     {"peak_force_N", s.peak_force},
-                     {"peak_force_time_s", s.peak_force_time},
-                     {"wall_hits", s.wall_hits},
-                     {"restitution", s.wall_hits > 0 ? Json(s.restitution.mean) : Json()},
-                     {"restitution_deviation", s.restitution.deviation},
-                     {"normal_loss_J", s.normal_loss},
-                     {"tangential_loss_J", s.tangential_loss},
-                     {"friction_loss_J", s.friction_loss}};
-  if (!(s.restitution.mean == s.restitution.mean)) out["contacts"]["restitution"] = Json();
-  out["rest_time_s"] = json_of(s.rest_time);
-  return out;
-}
-
 void print_summary(const io::LogReader& log, const AnalysisSummary& s) {
   print(fmt::format("{}: steps {} to {}, t = {:.6g} to {:.6g} s, {} states, {} grains\n",
                     log.path(), s.first_step, s.last_step, s.first_time, s.last_time, s.states,
@@ -275,7 +229,7 @@ int run_analyze(const Invocation& invocation) {
               });
   files.close();
   if (invocation.globals.json)
-    print(json_of(*log, summary).dump(2) + "\n");
+    print(summary_json(*log, summary).dump(2) + "\n");
   else if (!to_output)
     print_summary(*log, summary);
   return exit_ok;
