@@ -11,9 +11,9 @@ Json json_of(const std::optional<double>& value) { return value ? Json(*value) :
 
 }  // namespace
 
-nlohmann::ordered_json summary_json(const io::LogReader& log, const AnalysisSummary& s) {
+nlohmann::ordered_json summary_json(const std::string& run, const AnalysisSummary& s) {
   Json out{{"schema", "varve.analyze/1"},
-           {"run", log.path()},
+           {"run", run},
            {"steps", {{"first", std::to_string(s.first_step)},
                       {"last", std::to_string(s.last_step)},
                       {"stride", std::to_string(s.stride)},

@@ -8,6 +8,7 @@
 
 namespace varve::tools {
 
-nlohmann::ordered_json summary_json(const io::LogReader& log, const AnalysisSummary& summary);
+/// `run` is the path that the object names.
+nlohmann::ordered_json summary_json(const std::string& run, const AnalysisSummary& summary);
 
 }  // namespace varve::tools

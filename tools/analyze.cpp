@@ -229,7 +229,7 @@ int run_analyze(const Invocation& invocation) {
               });
   files.close();
   if (invocation.globals.json)
-    print(summary_json(*log, summary).dump(2) + "\n");
+    print(summary_json(log->path(), summary).dump(2) + "\n");
   else if (!to_output)
     print_summary(*log, summary);
   return exit_ok;

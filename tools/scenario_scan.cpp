@@ -46,7 +46,8 @@ std::string shown(std::string_view text) {
 
 class Scanner {
  public:
-  Scanner(std::string_view text, const std::string& source) : text_(text), source_(source) {}
+  Scanner(std::string_view text, const std::string& source, const SectionRules& rules)
+      : text_(text), source_(source), rules_(rules) {}
 
   Scan run() {
     if (!check_bytes()) return std::move(scan_);
@@ -68,8 +69,8 @@ class Scanner {
   bool check_bytes() {
     constexpr std::string_view utf8_mark = "\xef\xbb\xbf";
     if (text_.size() > file_bytes_max) {
-      error(0, 0, fmt::format("{} bytes; expected a scenario of at most {} bytes", text_.size(),
-                              file_bytes_max));
+      error(0, 0, fmt::format("{} bytes; expected a {} of at most {} bytes", text_.size(),
+                              rules_.what, file_bytes_max));
       return false;
     }
     if (text_.starts_with("\xff\xfe") || text_.starts_with("\xfe\xff")) {
@@ -117,21 +118,11 @@ class Scanner {
     section_ = name;
     meant_ = name;
     usable_ = true;
-    const bool is_event = name.starts_with("event.") && name.size() > 6;
-    const bool is_species = name.starts_with("species.") && name.size() > 8;
-    if (is_event || is_species) {
-      note_section(number);
-      return;
-    }
-    const std::vector<std::string_view> names = section_names();
-    if (std::find(names.begin(), names.end(), name) != names.end()) {
-      note_section(number);
-      return;
-    }
-    std::vector<std::string_view> all = names;
-    all.push_back("species.NAME");
-    all.push_back("event.NAME");
-    const std::string_view nearest = nearest_name(name, names);
+    if (is_known(name)) return note_section(number);
+    std::vector<std::string> all(rules_.names.begin(), rules_.names.end());
+    for (const std::string_view family : rules_.families)
+      all.push_back(std::string(family) + "NAME");
+    const std::string nearest = nearest_section(name);
     if (whole && !name.empty())
       error(number, column,
             fmt::format("unknown section '{}'; {}", shown(name),
@@ -140,6 +131,22 @@ class Scanner {
     meant_ = nearest;
     usable_ = !nearest.empty();
     if (usable_) note_section(number);
+  }
+
+  bool is_known(std::string_view name) const {
+    for (const std::string_view family : rules_.families)
+      if (name.starts_with(family) && name.size() > family.size()) return true;
+    return std::find(rules_.names.begin(), rules_.names.end(), name) != rules_.names.end();
+  }
+
+  /// A section's name with what is misspelt of it put right, "" where nothing is near.
+  std::string nearest_section(std::string_view name) const {
+    if (const std::string_view near = nearest_name(name, rules_.names); !near.empty())
+      return std::string(near);
+    const std::size_t dot = name.find('.');
+    if (dot == std::string_view::npos || dot + 1 == name.size()) return "";
+    const std::string_view family = nearest_name(name.substr(0, dot + 1), rules_.families);
+    return family.empty() ? "" : std::string(family) + std::string(name.substr(dot + 1));
   }
 
   void note_section(int number) { scan_.sections.push_back({meant_, number}); }
@@ -157,7 +164,8 @@ class Scanner {
     }
     if (!usable_) return;  // the section's own error has said it
     if (section_.empty() && key.find('.') == std::string_view::npos) {
-      const std::string_view meant = core::nearest_key(key);
+      const std::string_view meant =
+          rules_.nearest_key ? rules_.nearest_key(key) : std::string_view();
       error(number, column,
             fmt::format("key '{}' stands before any [section]{}", shown(key),
                         meant.empty() ? "" : fmt::format("; did you mean '{}'?", meant)));
@@ -192,6 +200,7 @@ class Scanner {
 
   std::string_view text_;
   const std::string& source_;
+  const SectionRules& rules_;
   Scan scan_;
   std::string section_, meant_;  ///< as written; as it is taken
   bool usable_ = true;
@@ -200,8 +209,14 @@ class Scanner {
 
 }  // namespace
 
+Scan scan_ini(std::string_view text, const std::string& source, const SectionRules& rules) {
+  return Scanner(text, source, rules).run();
+}
+
 Scan scan_scenario(std::string_view text, const std::string& source) {
-  return Scanner(text, source).run();
+  static const SectionRules rules{
+      "scenario", section_names(), {"species.", "event."}, core::nearest_key};
+  return scan_ini(text, source, rules);
 }
 
 }  // namespace varve::tools
