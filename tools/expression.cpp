@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "core/math.h"
 #include "core/units.h"
 #include "tools/cli.h"
 
@@ -18,8 +19,9 @@ constexpr double none = std::numeric_limits<double>::quiet_NaN();
 constexpr std::size_t depth_max = 64;
 constexpr std::size_t unlimited = std::numeric_limits<std::size_t>::max();
 
-constexpr std::array<FunctionRule, 6> arithmetic = {{{"abs", 1, 1},
+constexpr std::array<FunctionRule, 7> arithmetic = {{{"abs", 1, 1},
                                                      {"sqrt", 1, 1},
+                                                     {"power", 2, 2},
                                                      {"least", 1, unlimited},
                                                      {"greatest", 1, unlimited},
                                                      {"exists", 1, 1},
@@ -292,6 +294,7 @@ double call(const Expression& node, const NodeValue& value_of) {
     if (std::isnan(each)) return none;
   if (node.name == "abs") return std::abs(values[0]);
   if (node.name == "sqrt") return values[0] < 0 ? none : std::sqrt(values[0]);
+  if (node.name == "power") return core::pow(values[0], values[1]);
   if (node.name == "least") return *std::min_element(values.begin(), values.end());
   return *std::max_element(values.begin(), values.end());
 }

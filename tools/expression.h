@@ -53,8 +53,8 @@ Expression parse_expression(std::string_view text);
 using NodeValue = std::function<std::optional<double>(const Expression&)>;
 
 /// Value in double; NaN stands for "has none", and so is whatever is computed from it. `value_of`
-/// is asked first at every reference and call. Functions known here: abs, sqrt, least, greatest,
-/// exists, default. Throws ExpressionError for a name that nobody knows.
+/// is asked first at every reference and call. Functions known here: abs, sqrt, power, least,
+/// greatest, exists, default. Throws ExpressionError for a name that nobody knows.
 double evaluate(const Expression& expression, const NodeValue& value_of);
 
 /// Names of those functions with the least and the greatest number of arguments.

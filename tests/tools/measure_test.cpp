@@ -47,6 +47,8 @@ TEST(Expressions, AreArithmeticWithTheUsualRanks) {
   EXPECT_EQ(number("2 - 3 - 4"), -5);
   EXPECT_EQ(number("1 < 2 and not 3 <= 2 or 1 == 0"), 1);
   EXPECT_EQ(number("not not 3 > 2"), 1);
+  EXPECT_EQ(number("power(2, 10)"), 1024);
+  EXPECT_TRUE(std::isnan(number("power(0 - 2, 0.5)")));
   EXPECT_EQ(number("greatest(1, sqrt(9), abs(-2)) - least(4, 5)"), -1);
 }
 
