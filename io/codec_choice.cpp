@@ -19,8 +19,8 @@ constexpr std::size_t sample_run = 16;
 /// the second stage will see it.
 constexpr unsigned fit_order = order_max - 2;
 /// A change disturbs the second stage a little: it must pay.
-constexpr double worth_a_change = 0.985;
-constexpr double worth_a_lower_order = 0.96;
+constexpr double worth_a_change = 0.995;
+constexpr double worth_a_lower_order = 0.97;
 constexpr double worth_a_refit = 0.995;
 
 /// Four times the binary logarithm of |x|, in exponent and two bits.

@@ -9,7 +9,7 @@ namespace varve::io::codec {
 namespace {
 
 /// Frames between two looks at the model of the entropy coder, once the history is old.
-constexpr unsigned model_interval = 8;
+constexpr unsigned model_interval = 16;
 /// Values of a frame that are counted for it.
 constexpr std::size_t count_values = 4096;
 /// Runs of neighbours per component on which levels are measured.
