@@ -1,4 +1,5 @@
-// T13 head-on contact, T14 oblique impact and rolling: grains alone, against closed forms.
+// T13 head-on contact, linear and Hertz's, T14 oblique impact and rolling: grains alone, against
+// closed forms.
 #include <algorithm>
 #include <cmath>
 
@@ -32,6 +33,7 @@ core::Scenario dry_grain(int dimension) {
 struct Hit {
   double impact = 0, rebound = 0;     // [m/s]
   double pushing = 0, overlap = 0;    // [s] with a force, [m]
+  double force = 0;                   // [N] largest
 };
 
 Hit run_hit(Experiment& run, double longest) {
@@ -45,6 +47,7 @@ Hit run_hit(Experiment& run, double longest) {
       hit.impact = run.column("contacts", "impact_speed")[0];
     if (force[0] > 0) hit.pushing += run.dt();
     hit.overlap = std::max(hit.overlap, run.column("contacts", "peak_overlap")[0]);
+    hit.force = std::max(hit.force, force[0]);
     if (ends[0] > 0) {
       hit.rebound = run.column("contacts", "rebound_speed")[0];
       break;
@@ -115,6 +118,56 @@ std::vector<ValidationRow> linear_contact() {
   rows.push_back(relative_row("at rest: overlap", "m", mass * standard_gravity / k,
                               0.5 * lying.grains.diameter - rest.field("grains.position")[1],
                               0.005));
+  return rows;
+}
+
+/// An elastic sphere: Hertz's largest force and overlap and the duration are printed.
+struct Material {
+  const char* name;
+  double modulus, ratio, density;     // [Pa], [kg/m3]
+  double force, overlap, duration;    // [N], [m], [s]
+};
+
+/// Two of 10 mm radius meet at 10 m/s each, or one of 0.1 m radius a rigid wall at 0.2 m/s.
+void add_hertz(const Material& material, bool pair, std::vector<ValidationRow>& rows) {
+  const double radius = pair ? 0.01 : 0.1, gap = 1e-3 * material.overlap;
+  core::Scenario s = dry_grain(3);
+  s.domain.width = s.domain.height = s.domain.depth = 10 * radius;
+  s.grains.diameter = 2 * radius;
+  s.grains.density = material.density;
+  s.grains.rows = pair ? 2 : 1;
+  s.grains.gap = 0.5 * gap / radius;  // of diameters
+  s.grains.lowest_y = pair ? 3 * radius : radius + gap;
+  s.contact.law = core::ContactLaw::hertz;
+  s.contact.stiffness = core::automatic;
+  s.contact.youngs_modulus = material.modulus;
+  s.contact.poisson_ratio = material.ratio;
+  s.contact.damping = s.contact.friction = 0;
+  s.time.dt = material.duration / 2000;
+  Experiment run(s);
+  if (pair) run.set_field("grains.velocity", {0, 10, 0, 0, -10, 0});
+  else run.set_field("grains.velocity", {0, -0.2, 0});
+  const Hit hit = run_hit(run, 2 * material.duration);
+  const auto add = [&](const char* what, const char* unit, double reference, double ours) {
+    rows.push_back(relative_row(fmt::format("{}, {}: {}", pair ? "pair" : "wall", material.name,
+                                            what), unit, reference, ours, 0.005));
+  };
+  add("largest force", "N", material.force, hit.force);
+  add("largest overlap", "m", material.overlap, hit.overlap);
+  add("duration", "s", material.duration, hit.pushing);
+  add("restitution", "", 1, hit.rebound / hit.impact);
+}
+
+std::vector<ValidationRow> hertz_contact() {
+  std::vector<ValidationRow> rows;
+  for (const Material& material :
+       {Material{"glass", 4.8e10, 0.2, 2800, 10.70e3, 274.1e-6, 40.3e-6},
+        Material{"limestone", 2e10, 0.25, 2500, 7.108e3, 368.3e-6, 54.2e-6}})
+    add_hertz(material, true, rows);
+  for (const Material& material :
+       {Material{"aluminium alloy", 7e10, 0.3, 2699, 11.37e3, 49.72e-6, 731.7e-6},
+        Material{"magnesium alloy", 4e10, 0.35, 1800, 7.233e3, 52.12e-6, 767.1e-6}})
+    add_hertz(material, false, rows);
   return rows;
 }
 
@@ -208,6 +261,10 @@ void add_contact_cases(std::vector<ValidationCase>& cases) {
                    "a sphere of 2.5 mm hits floor and twin, k = 1e4 N/m",
                    "the damped oscillator whose dashpot never pulls, Schwager and Poeschel 2007",
                    linear_contact});
+  cases.push_back({"hertz_contact", "T13", CaseKind::fast,
+                   "two elastic spheres of 20 mm meet at 20 m/s, one of 0.2 m a rigid wall at "
+                   "0.2 m/s",
+                   "Chung and Ooi 2011, tests 1 and 2: Hertz 1882", hertz_contact});
   cases.push_back({"oblique_impact", "T14", CaseKind::fast,
                    "a grain of 5 mm hits the floor at 3.9 m/s aslant and slides throughout",
                    "Chung and Ooi 2011, test 4: mu = 0.092, e = 0.98", oblique_impact});

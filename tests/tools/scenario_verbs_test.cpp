@@ -88,7 +88,9 @@ TEST(Init, Failures) {
   const CommandResult unknown = run_command({"varve-init", "colum"});
   EXPECT_EQ(unknown.code, 2);
   EXPECT_EQ(unknown.errors,
-            "varve init: preset: expected one of single_disc, column, hydrostatic, got 'colum'; "
+            "varve init: preset: expected one of single_disc, column, hydrostatic, "
+            "hydrostatic_full, inclined, polydisperse, pipe3d, cavity, poiseuille, "
+            "taylor_green, dam_break, got 'colum'; "
             "did you mean 'column'?\n");
   EXPECT_EQ(run_command({"varve-init", "-o", folder / "no/such/folder.cfg"}).code, 2);
   EXPECT_EQ(run_command({"varve-init", "-o", folder.path()}).code, 2);

@@ -11,10 +11,16 @@ namespace {
 
 constexpr std::uint64_t steps = 70;
 
-/// Six grains in a box that becomes wider on the way: the fluid's count changes.
-std::string widening_scene(const std::string& precision, const std::string& tier_keys) {
-  return "[scenario]\nprecision = " + precision + "\n" +
-         crowd_scene(tier_keys + "[event.wider]\nat_step = 40\ndomain.width = 1.6 cm\n");
+/// Six grains in a box that becomes wider on the way: the fluid's count changes. `kind` is a
+/// precision, or "3D": spheres in a box four of them deep, in doubles.
+std::string widening_scene(const std::string& kind, const std::string& tier_keys) {
+  const std::string wider = "[event.wider]\nat_step = 40\ndomain.width = 1.6 cm\n";
+  if (kind != "3D")
+    return "[scenario]\nprecision = " + kind + "\n" + crowd_scene(tier_keys + wider);
+  std::string scene = crowd_scene(tier_keys + wider);
+  const std::string head = "[domain]\n";
+  scene.replace(scene.find(head), head.size(), head + "dimension = 3\ndepth = 1 cm\n");
+  return scene;
 }
 
 class Tiers : public ::testing::TestWithParam<const char*> {
@@ -94,7 +100,7 @@ TEST_P(Tiers, InfoAccountsForEveryByteAndSaysTheRatio) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Precision, Tiers, ::testing::Values("double", "float", "mixed"));
+INSTANTIATE_TEST_SUITE_P(Kinds, Tiers, ::testing::Values("double", "float", "mixed", "3D"));
 
 }  // namespace
 }  // namespace varve::test
