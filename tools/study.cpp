@@ -1,6 +1,7 @@
 // varve study: sensitivity studies made of runs and forks, from a study file to a report.
 #include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <map>
@@ -19,6 +20,7 @@
 #include "tools/study_member.h"
 #include "tools/study_plan.h"
 #include "tools/study_pool.h"
+#include "tools/study_report.h"
 #include "tools/study_store.h"
 #include "tools/study_values.h"
 
@@ -294,6 +296,57 @@ int status(const Request& request) {
   return all[MemberState::failed] > 0 ? exit_study : exit_ok;
 }
 
+// ---- report -------------------------------------------------------------------------------------
+
+/// Writes a report in the form that its name's ending says.
+void write_report(const Document& document, const std::string& path, const std::string& plots) {
+  if (path.ends_with(".html")) return write_whole(path, html_of(document));
+  if (!path.ends_with(".md"))
+    throw UsageError(fmt::format("-o: '{}'; expected a name that ends in .html or .md", path));
+  if (plots.empty()) return write_whole(path, markdown_of(document, ""));
+  std::error_code failed;
+  fs::create_directories(plots, failed);
+  if (failed) throw ToolError(exit_output, fmt::format("{}: {}", plots, failed.message()));
+  for (const DocumentBlock& block : document.blocks)
+    if (const auto* plot = std::get_if<DocumentPlot>(&block))
+      write_whole((fs::path(plots) / (plot->name + ".svg")).string(), svg_of(plot->plot));
+  const fs::path beside = fs::absolute(path).parent_path();
+  write_whole(path, markdown_of(document, fs::absolute(plots).lexically_relative(beside).string()));
+}
+
+int report(const Request& request) {
+  if (!fs::exists(request.store.path("members")))
+    throw UsageError(fmt::format("{}: no results; varve study run {} makes them",
+                                 request.store.folder(), request.plan.file.path));
+  request.store.write_results();
+  const StudyData data(request.plan, request.store);
+  const Document document = report_of(data);
+  std::vector<std::string> paths = request.invocation.values("output");
+  if (paths.empty())
+    paths = {request.store.path("report.html"), request.store.path("report.md")};
+  const std::string plots =
+      request.invocation.has("plots") ? request.invocation.value("plots") : std::string();
+  for (const std::string& path : paths) write_report(document, path, plots);
+  if (request.invocation.globals.json) {
+    Json out{{"schema", "varve.study_report/1"}, {"study", request.plan.file.path}};
+    out["files"] = paths;
+    out["claims"] = Json::array();
+    for (const StudyClaim& claim : request.plan.file.claims) {
+      const ClaimResult result = judge(data, claim);
+      const auto number = [](double value) { return std::isnan(value) ? Json() : Json(value); };
+      out["claims"].push_back({{"id", claim.id},
+                               {"verdict", name_of(result.verdict)},
+                               {"ours", number(result.ours)},
+                               {"spread", number(result.spread)},
+                               {"seeds", std::to_string(result.seeds)}});
+    }
+    print(out.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+  } else {
+    for (const std::string& path : paths) note(request.invocation.globals, "wrote " + path);
+  }
+  return exit_ok;
+}
+
 int study(const Invocation& invocation) {
   if (invocation.has("help-format")) {
     print(study_format);
@@ -311,6 +364,7 @@ int study(const Invocation& invocation) {
       {"run", run},
       {"status", status},
       {"retry", retry},
+      {"report", report},
   };
   const auto found = actions.find(action);
   if (found == actions.end()) {
@@ -326,7 +380,7 @@ int study(const Invocation& invocation) {
 Verb verb() {
   Verb verb;
   verb.name = "study";
-  verb.usage = "plan|run|status|retry FILE";
+  verb.usage = "plan|run|status|retry|report FILE";
   verb.summary = "Runs and forks over varied keys, what is measured of them, and a report.";
   verb.description =
       "A study file names cases (scenarios or forks, keys to vary, seeds), measures and claims;\n"
@@ -335,12 +389,16 @@ Verb verb() {
       "  varve study plan damping.study --dry-run      what would be run, how long, how large\n"
       "  varve study run damping.study -j 2\n"
       "  varve study status damping.study\n"
-      "  varve study retry damping.study               only what failed\n";
+      "  varve study retry damping.study               only what failed\n"
+      "  varve study report damping.study -o damping.html -o damping.md\n";
   verb.options = {
       {"folder", "DIR", "folder of the results [NAME.results]", false, ""},
       {"jobs,j", "N", "members side by side", false, "1"},
       {"quick", "", "only cases with quick = yes", false, ""},
       {"only", "CASES", "only these cases (and what they are forked from); n* for many", true, ""},
+      {"output,o", "FILE", "of report: page (.html) or Markdown (.md) [both, in the folder]", true,
+       ""},
+      {"plots", "DIR", "of report: SVG files that the Markdown shows", false, ""},
       {"dry-run", "", "of plan and run: print the plan, expected time and bytes", false, ""},
       threads_spec(),
       {"help-format", "", "the format of study files", false, ""},

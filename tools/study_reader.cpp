@@ -12,6 +12,7 @@
 #include "core/units.h"
 #include "tools/cli.h"
 #include "tools/scenario_scan.h"
+#include "tools/study_claims.h"
 #include "tools/study_values.h"
 
 namespace varve::tools {
@@ -532,7 +533,9 @@ void StudyReader::take_claim(const Section& section) {
       each.value_text = entry.value;
       each.value_place = entry.place;
       try {
-        each.value = parse_expression(entry.value);
+        Expression expression = parse_expression(entry.value);
+        check_claim(expression);
+        each.value = std::move(expression);
       } catch (const ExpressionError& error) {
         found_.push_back(misplaced(entry.place, "value", error));
       }

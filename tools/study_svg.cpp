@@ -1,0 +1,210 @@
+#include "tools/study_svg.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include <fmt/format.h>
+
+namespace varve::tools {
+namespace {
+
+constexpr double width = 640, height = 380, left = 74, right = 150, top = 34, bottom = 56;
+constexpr std::array<const char*, 10> colours = {"#1b6ca8", "#d1495b", "#2e8b57", "#b8860b",
+                                                 "#6a4c93", "#008b8b", "#8b4513", "#c71585",
+                                                 "#556b2f", "#444444"};
+
+struct Range {
+  double least = std::numeric_limits<double>::infinity(), most = -least;
+  void take(double value) {
+    if (std::isnan(value)) return;
+    least = std::min(least, value);
+    most = std::max(most, value);
+  }
+  void widen() {
+    if (!(least <= most)) least = most = 0;
+    if (least == most) {
+      const double pad = least == 0 ? 1 : 0.1 * std::abs(least);
+      least -= pad;
+      most += pad;
+      return;
+    }
+    const double pad = 0.04 * (most - least);
+    least -= pad;
+    most += pad;
+  }
+};
+
+double spread_at(const PlotSeries& series, std::size_t i) {
+  return i < series.spread.size() && !std::isnan(series.spread[i]) ? series.spread[i] : 0;
+}
+
+class Drawing {
+ public:
+  explicit Drawing(const Plot& plot) : plot_(plot) {
+    for (const PlotSeries& series : plot.series)
+      for (std::size_t i = 0; i < series.x.size(); ++i) {
+        if (std::isnan(series.y[i])) continue;
+        x_.take(series.x[i]);
+        y_.take(series.y[i] - spread_at(series, i));
+        y_.take(series.y[i] + spread_at(series, i));
+      }
+    if (!plot.categories.empty()) {
+      x_.least = -0.5;
+      x_.most = static_cast<double>(plot.categories.size()) - 0.5;
+    } else {
+      x_.widen();
+    }
+    // Zero belongs to the picture where it is near.
+    if (y_.least > 0 && y_.least < 0.35 * y_.most) y_.least = 0;
+    y_.widen();
+  }
+
+  std::string run() {
+    out_ = fmt::format("<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {} {}\" "
+                       "width=\"{}\" height=\"{}\" font-family=\"sans-serif\" font-size=\"12\" "
+                       "role=\"img\">\n<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n",
+                       width, height, width, height);
+    text(left, 20, plot_.title, "start", "font-size=\"14\"");
+    axes();
+    for (std::size_t i = 0; i < plot_.series.size(); ++i) series(i);
+    legend();
+    return out_ + "</svg>\n";
+  }
+
+ private:
+  double px(double x) const {
+    return left + (x - x_.least) / (x_.most - x_.least) * (width - left - right);
+  }
+  double py(double y) const {
+    return height - bottom - (y - y_.least) / (y_.most - y_.least) * (height - top - bottom);
+  }
+  void text(double x, double y, const std::string& what, const char* anchor,
+            const std::string& more = "") {
+    out_ += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\" fill=\"#222222\" "
+                        "{}>{}</text>\n",
+                        x, y, anchor, more, escape_markup(what));
+  }
+  void line(double x1, double y1, double x2, double y2, const char* colour, double thick) {
+    out_ += fmt::format("<line x1=\"{:.1f}\" y1=\"{:.1f}\" x2=\"{:.1f}\" y2=\"{:.1f}\" "
+                        "stroke=\"{}\" stroke-width=\"{}\"/>\n",
+                        x1, y1, x2, y2, colour, thick);
+  }
+
+  void axes() {
+    const double floor = height - bottom, end = width - right;
+    for (const double tick : axis_ticks(y_.least, y_.most, 6)) {
+      line(left, py(tick), end, py(tick), "#dddddd", 1);
+      text(left - 6, py(tick) + 4, fmt::format("{:.4g}", tick), "end");
+    }
+    if (plot_.categories.empty()) {
+      for (const double tick : axis_ticks(x_.least, x_.most, 7)) {
+        line(px(tick), floor, px(tick), floor + 5, "#222222", 1);
+        text(px(tick), floor + 18, fmt::format("{:.4g}", tick), "middle");
+      }
+    } else {
+      const bool many = plot_.categories.size() > 6;
+      for (std::size_t i = 0; i < plot_.categories.size(); ++i) {
+        const double x = px(static_cast<double>(i));
+        text(x, floor + 16, plot_.categories[i], many ? "end" : "middle",
+             many ? fmt::format("font-size=\"10\" transform=\"rotate(-35 {:.1f} {:.1f})\"", x,
+                                floor + 16)
+                  : "");
+      }
+    }
+    line(left, floor, end, floor, "#222222", 1);
+    line(left, top, left, floor, "#222222", 1);
+    text(0.5 * (left + end), height - 10, plot_.x_label, "middle");
+    const double middle = 0.5 * (top + floor);
+    text(16, middle, plot_.y_label, "middle",
+         fmt::format("transform=\"rotate(-90 16 {:.1f})\"", middle));
+  }
+
+  void series(std::size_t index) {
+    const PlotSeries& each = plot_.series[index];
+    const char* colour = colours[index % colours.size()];
+    std::string path, upper, lower;
+    for (std::size_t i = 0; i < each.x.size(); ++i) {
+      if (std::isnan(each.y[i])) continue;
+      const double x = px(each.x[i]), s = spread_at(each, i);
+      path += fmt::format("{:.1f},{:.1f} ", x, py(each.y[i]));
+      upper += fmt::format("{:.1f},{:.1f} ", x, py(each.y[i] + s));
+      lower = fmt::format("{:.1f},{:.1f} ", x, py(each.y[i] - s)) + lower;
+    }
+    if (each.band && !each.spread.empty())
+      out_ += fmt::format("<polygon points=\"{}{}\" fill=\"{}\" fill-opacity=\"0.18\" "
+                          "stroke=\"none\"/>\n",
+                          upper, lower, colour);
+    if (each.line)
+      out_ += fmt::format("<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" "
+                          "stroke-width=\"1.6\"/>\n",
+                          path, colour);
+    if (each.band) return;
+    for (std::size_t i = 0; i < each.x.size(); ++i) {
+      if (std::isnan(each.y[i])) continue;
+      const double x = px(each.x[i]), s = spread_at(each, i);
+      if (s > 0) line(x, py(each.y[i] - s), x, py(each.y[i] + s), colour, 1.4);
+      out_ += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3.4\" fill=\"{}\"/>\n", x,
+                          py(each.y[i]), colour);
+    }
+  }
+
+  void legend() {
+    if (plot_.series.size() < 2 && (plot_.series.empty() || plot_.series[0].name.empty())) return;
+    constexpr std::size_t shown = 18;
+    for (std::size_t i = 0; i < std::min(shown, plot_.series.size()); ++i) {
+      const double y = top + 8 + 17 * static_cast<double>(i);
+      line(width - right + 10, y, width - right + 26, y, colours[i % colours.size()], 3);
+      text(width - right + 31, y + 4, plot_.series[i].name, "start", "font-size=\"10\"");
+    }
+  }
+
+  const Plot& plot_;
+  Range x_, y_;
+  std::string out_;
+};
+
+}  // namespace
+
+bool Plot::empty() const {
+  for (const PlotSeries& each : series)
+    for (const double value : each.y)
+      if (!std::isnan(value)) return false;
+  return true;
+}
+
+std::vector<double> axis_ticks(double least, double most, std::size_t count) {
+  const double rough = (most - least) / static_cast<double>(std::max<std::size_t>(1, count));
+  if (!(rough > 0) || !std::isfinite(rough)) return {least};
+  const double power = std::pow(10, std::floor(std::log10(rough)));
+  double step = 10 * power;
+  for (const double factor : {1.0, 2.0, 5.0})
+    if (factor * power >= rough) {
+      step = factor * power;
+      break;
+    }
+  std::vector<double> ticks;
+  const double first = std::ceil(least / step);
+  for (double k = first; k * step <= most * (1 + 1e-12) && ticks.size() < 4 * count; ++k)
+    ticks.push_back(k == 0 ? 0 : k * step);
+  return ticks;
+}
+
+std::string escape_markup(const std::string& text) {
+  std::string out;
+  for (const char c : text) {
+    switch (c) {
+      case '<': out += "&lt;"; break;
+      case '>': out += "&gt;"; break;
+      case '&': out += "&amp;"; break;
+      case '"': out += "&quot;"; break;
+      default: out += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
+    }
+  }
+  return out;
+}
+
+std::string svg_of(const Plot& plot) { return Drawing(plot).run(); }
+
+}  // namespace varve::tools
