@@ -117,9 +117,10 @@ void add_sensitivities(Document& document, const StudyData& data) {
       document.text(
           "Slope: a straight line through all members of the case, other varied keys held, with "
           "its 95 % interval (Student's t). Elasticity: relative change of the measure per "
-          "relative change of the key, at their means. Rank: by the size of the elasticity. Effect: "
-          "the slope times the range of the key (of words, the range of the means); it is below noise "
-          "where it is less than twice the spread over seeds. Damping and width come first.");
+          "relative change of the key, at their means. Rank: by the size of the elasticity. "
+          "Effect: the slope times the range of the key (of words, the range of the means); it "
+          "is below noise where it is less than twice the spread over seeds. Damping and width "
+          "come first.");
       begun = true;
     }
     document.heading(3, label_of(measure));
