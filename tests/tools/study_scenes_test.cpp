@@ -1,6 +1,10 @@
-// The study's scenes: each checks out and starts, and what they have in common they do have.
+// The study's scenes and study files: all of them are sound, and the quick part of the figures runs
+// and comes out as it must.
 #include <algorithm>
 #include <filesystem>
+#include <fstream>
+#include <map>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -67,6 +71,96 @@ TEST(StudyScenes, AnArrayThatDoesNotFitIsRefused) {
                "grains.columns=40"});
   EXPECT_FALSE(refused.errors.empty());
   EXPECT_FALSE(fs::exists(folder / "a.varve"));
+}
+
+TEST(StudyFiles, AllOfThemPlan) {
+  const std::vector<std::string> studies = files_of(".study");
+  EXPECT_THAT(studies, testing::ElementsAre("as_stated", "figures", "forks", "scan"));
+  for (const std::string& study : studies) {
+    const TemporaryFolder folder;
+    verb(0, {"study", "plan", (study_folder() / (study + ".study")).string(), "--folder",
+             folder / "results", "--dry-run"});
+  }
+}
+
+/// Rows of a table without quoted cells, by the names in its first line.
+std::vector<std::map<std::string, std::string>> rows_of(const fs::path& file) {
+  std::ifstream in(file);
+  const auto cells_of = [](const std::string& line) {
+    std::vector<std::string> cells;
+    std::stringstream stream(line + ",");
+    for (std::string cell; std::getline(stream, cell, ',');) cells.push_back(cell);
+    return cells;
+  };
+  std::string line;
+  std::getline(in, line);
+  const std::vector<std::string> names = cells_of(line);
+  std::vector<std::map<std::string, std::string>> rows;
+  while (std::getline(in, line)) {
+    const std::vector<std::string> cells = cells_of(line);
+    EXPECT_EQ(cells.size(), names.size()) << line;
+    auto& row = rows.emplace_back();
+    for (std::size_t i = 0; i < std::min(cells.size(), names.size()); ++i) row[names[i]] = cells[i];
+  }
+  return rows;
+}
+
+/// One measure of every finished member of a case.
+std::vector<double> measured(const std::vector<std::map<std::string, std::string>>& rows,
+                             const std::string& name, const std::string& measure) {
+  std::vector<double> values;
+  for (const auto& row : rows)
+    if (row.at("case") == name && row.at("status") == "ok")
+      values.push_back(std::stod(row.at(measure)));
+  return values;
+}
+
+/// Values that follow from geometry, from the closed form of a contact or from a published
+/// benchmark; the rest is what the report is for.
+TEST(StudyFiles, TheQuickPartOfTheFiguresRuns) {
+  using testing::DoubleNear;
+  using testing::ElementsAre;
+  const TemporaryFolder folder;
+  const std::vector<std::string> study = {(study_folder() / "figures.study").string(), "--folder",
+                                          folder / "results", "--quick"};
+  const auto run = [&](const char* action) {
+    std::vector<std::string> words{"study", action};
+    words.insert(words.end(), study.begin(), study.end());
+    return verb(0, words);
+  };
+  run("run");
+  const auto rows = rows_of(fs::path(folder / "results") / "results.csv");
+  EXPECT_THAT(measured(rows, "porosity_regular", "porosity_disc"),
+              ElementsAre(DoubleNear(0.185, 0.002)));
+  EXPECT_THAT(measured(rows, "porosity_regular", "porosity_hole"),
+              ElementsAre(DoubleNear(0.234, 0.002)));
+  EXPECT_THAT(measured(rows, "porosity_staggered", "porosity_disc"),
+              ElementsAre(DoubleNear(0.067, 0.002)));
+  EXPECT_THAT(measured(rows, "single", "contact_time"), ElementsAre(DoubleNear(0.74, 0.022)));
+  EXPECT_THAT(measured(rows, "single", "plateau"), ElementsAre(DoubleNear(0.0557, 0.0028)));
+  const std::vector<double> rebounds = measured(rows, "rebound", "restitution");
+  ASSERT_EQ(rebounds.size(), 15u);
+  for (std::size_t i = 0; i < rebounds.size(); i += 3) {
+    EXPECT_GT(rebounds[i], rebounds[i + 1]);      // damping 0.15, 0.20, 0.25 at one speed
+    EXPECT_GT(rebounds[i + 1], rebounds[i + 2]);
+    EXPECT_THAT(rebounds[i + 1], DoubleNear(0.71, 0.06));
+  }
+  const std::vector<double> lone = measured(rows, "number_1", "speed"),
+                            sixteen = measured(rows, "number_16", "speed");
+  ASSERT_EQ(lone.size(), 1u);
+  ASSERT_EQ(sixteen.size(), 1u);
+  EXPECT_LT(sixteen[0], lone[0]);
+  EXPECT_EQ(measured(rows, "packing_4x8", "speed").size(), 1u);
+  EXPECT_EQ(measured(rows, "packing_8x4", "speed").size(), 1u);
+
+  // What is done is not done again, and the table is the same to the byte.
+  const auto text_of = [&] {
+    std::ifstream in(fs::path(folder / "results") / "results.csv");
+    return std::string(std::istreambuf_iterator<char>(in), {});
+  };
+  const std::string first = text_of();
+  run("run");
+  EXPECT_EQ(text_of(), first);
 }
 
 }  // namespace
