@@ -180,11 +180,11 @@ std::string svg_of(const SvgPlot& plot) {
       ".label{{font-size:10px;fill:#333333}}</style>\n"
       "<rect width=\"{0:g}\" height=\"{1:g}\" fill=\"white\"/>\n",
       plot.width, plot.height);
-  out += fmt::format("<text x=\"{:g}\" y=\"24\" font-size=\"14\" text-anchor=\"middle\">{}</text>\n",
-                     plot.width / 2, xml_text(plot.title));
+  out += fmt::format("<text x=\"{:g}\" y=\"24\" font-size=\"14\" text-anchor=\"middle\">{}"
+                     "</text>\n", plot.width / 2, xml_text(plot.title));
   if (x_low > x_high) {
-    out += fmt::format("<text x=\"{:g}\" y=\"{:g}\" text-anchor=\"middle\">nothing to draw</text>\n",
-                       plot.width / 2, plot.height / 2);
+    out += fmt::format("<text x=\"{:g}\" y=\"{:g}\" text-anchor=\"middle\">nothing to draw"
+                       "</text>\n", plot.width / 2, plot.height / 2);
     return out + "</svg>\n";
   }
   const Axis x(x_low, x_high, plot.log_x, left, plot.width - right);

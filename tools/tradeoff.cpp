@@ -72,7 +72,8 @@ class Tradeoff {
     if (report_.seeds > 1 && seed_settings(report_.scene.base, 1).empty())
       throw UsageError("--seeds: nothing in this scene is drawn from a seed (no jitter, no random "
                        "packing); all runs would be the same");
-    report_.measures = choose_measures(report_.scene.base, invocation.values("measure"));
+    report_.measures = choose_measures(report_.scene.base, invocation.values("measure"),
+                                        invocation.values("known"));
     warn_of_few_states();
     const std::string name =
         std::filesystem::path(invocation.arguments.front()).stem().string() + ".tradeoff";
@@ -98,7 +99,8 @@ class Tradeoff {
  private:
   void warn_of_few_states() const {
     bool walks = false;
-    for (const Measure& each : report_.measures) walks = walks || each.needs_summary;
+    for (const TradeMeasure& each : report_.measures)
+      walks = walks || each.needs_summary || !each.expression.empty();
     const core::Record& record = report_.scene.base.record;
     if (walks && (record.tier == core::RecordTier::digests || record.every > 1))
       warn("the scene records few states, and measures are read from them; -s record.tier=deltas "
@@ -305,7 +307,7 @@ int tradeoff(const Invocation& invocation) {
   if (invocation.has("list")) {
     const TradeScene scene =
         load_trade_scene(invocation.arguments.front(), invocation.values("set"), {});
-    for (const Measure& each : measures_of(scene.base))
+    for (const TradeMeasure& each : measures_of(scene.base))
       print(fmt::format("{:<16} {}{}\n", each.name, each.meaning,
                         each.unit.empty() ? "" : " [" + each.unit + "]"));
     return exit_ok;
@@ -327,6 +329,7 @@ Verb verb() {
       "  varve tradeoff single_disc.cfg --dry-run          what would run, and what it takes\n"
       "  varve tradeoff column.cfg --until 0.15s --budget 10min --trim\n"
       "  varve tradeoff my.cfg --knobs none --vary fluid.density_diffusion=0,0.05,0.2\n"
+      "  varve tradeoff my.cfg --measure 'plateau=mean(settling.settling_speed_m_s, 0.3, 0.5)'\n"
       "  varve tradeoff column.cfg --log                   the price of recording\n"
       "  varve tradeoff my.cfg --limits --steps 300        how far the scene can be driven\n";
   verb.options = {
@@ -338,7 +341,10 @@ Verb verb() {
                          "record", true, ""},
       {"vary", "KEY=V,V", "a knob of your own; may be repeated", true, ""},
       {"rung", "KEY=V,KEY=V", "a rung of several settings; may be repeated", true, ""},
-      {"measure", "NAME", "what errors are taken of; --list tells which there are", true, ""},
+      {"measure", "NAME[=EXPR]", "what errors are taken of: one that --list names, or an "
+                                 "expression over what varve analyze gives", true, ""},
+      {"known", "NAME=VALUE", "what a measure should come to, in SI, in place of the reference",
+       true, ""},
       {"list", "", "names the measures of this scene", false, ""},
       {"reference", "RUNG", "rung that the others are compared with [the finest level]", false, ""},
       {"within", "SHARE", "recommend the cheapest rung within this error [1%, 2%, 5%]", true, ""},

@@ -36,6 +36,11 @@ struct TradeScene {
 TradeScene load_trade_scene(const std::string& file, std::vector<std::string> settings,
                             std::optional<double> until);
 
+/// `settings` on top of `base`: of a key that is in both, the value of `settings` (a scenario takes
+/// each key once).
+std::vector<std::string> settings_on_top(const std::vector<std::string>& base,
+                                         const std::vector<std::string>& settings);
+
 /// The scene with more settings, resolved; the first error's text where that makes no sense.
 struct Resolved {
   core::Scenario scenario;
@@ -67,13 +72,15 @@ std::vector<Rung> make_ladder(const TradeScene& scene, const LadderOptions& opti
 // ---- measures ----
 
 /// A number (or a curve) that a run gives.
-struct Measure {
+struct TradeMeasure {
   std::string name, unit, meaning;
   /// Known value, with what an error of it is divided by; else the reference rung's is it.
   std::optional<double> known;
   double scale = 1;
   bool needs_summary = false;   ///< AnalysisSummary of the whole log
   bool needs_energies = false;  ///< its table of energies too
+  /// Text of an expression over what `varve analyze` gives (tools/measure.h); empty: built in.
+  std::string expression;
   /// Empty where what it measures did not happen.
   std::function<std::vector<double>(const class RunView&)> evaluate;
 };
@@ -111,12 +118,14 @@ class RunView {
 };
 
 /// All built-in measures that make sense for a scene.
-std::vector<Measure> measures_of(const core::Scenario& scene);
+std::vector<TradeMeasure> measures_of(const core::Scenario& scene);
 /// Names of those taken where nobody asks.
 std::vector<std::string> default_measures(const core::Scenario& scene);
-/// The measures asked for by name, or the defaults. UsageError for an unknown name.
-std::vector<Measure> choose_measures(const core::Scenario& scene,
-                                     const std::vector<std::string>& asked);
+/// The measures asked for ("NAME" of a built-in one, or "NAME=EXPRESSION"), or the defaults.
+/// `known`: "NAME=VALUE", what a measure should come to. UsageError for what means nothing.
+std::vector<TradeMeasure> choose_measures(const core::Scenario& scene,
+                                          const std::vector<std::string>& asked,
+                                          const std::vector<std::string>& known);
 
 // ---- runs ----
 
@@ -145,11 +154,12 @@ struct RunSettings {
 /// Runs the scene so (a child), measures it and stores the result; takes it from the folder where
 /// it is there. Throws Exit{75} where a signal asks to stop.
 RungRun run_rung(const TradeScene& scene, const std::vector<std::string>& settings,
-                 const core::Scenario& resolved, const std::vector<Measure>& measures,
+                 const core::Scenario& resolved, const std::vector<TradeMeasure>& measures,
                  const RunSettings& how);
 /// Cost of the run that run_rung() would find; nothing where it would run it.
 std::optional<Cost> finished_cost(const core::Scenario& resolved,
-                                  const std::vector<Measure>& measures, const RunSettings& how);
+                                  const std::vector<TradeMeasure>& measures,
+                                  const RunSettings& how);
 
 /// What a run will take, from its first steps.
 Cost predict_cost(const core::Scenario& resolved, unsigned threads);
@@ -187,8 +197,8 @@ void share_values(std::vector<RungResult>& rungs);
 /// Fills cost, judged, worst, front of the rungs that ran. `reference`: index of the rung that
 /// measures without a known value are compared with. Measures that did not happen there are
 /// removed from `measures`; their names are returned.
-std::vector<std::string> judge(std::vector<Measure>& measures, std::vector<RungResult>& rungs,
-                               std::size_t reference);
+std::vector<std::string> judge(std::vector<TradeMeasure>& measures,
+                               std::vector<RungResult>& rungs, std::size_t reference);
 
 // ---- what is printed ----
 
@@ -198,7 +208,7 @@ struct Recommendation {
 };
 struct TradeReport {
   TradeScene scene;
-  std::vector<Measure> measures;
+  std::vector<TradeMeasure> measures;
   std::vector<std::string> missing;  ///< measures that did not happen
   std::vector<RungResult> rungs;
   std::size_t reference = 0;

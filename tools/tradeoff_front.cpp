@@ -45,7 +45,7 @@ double largest_of(const std::vector<double>& values) {
   return largest;
 }
 
-Judged judged_of(const Measure& measure, const RungResult& rung,
+Judged judged_of(const TradeMeasure& measure, const RungResult& rung,
                  const std::vector<double>& reference) {
   Judged out;
   const std::vector<double> mean = mean_of(rung, measure.name);
@@ -120,10 +120,10 @@ void share_values(std::vector<RungResult>& rungs) {
   }
 }
 
-std::vector<std::string> judge(std::vector<Measure>& measures, std::vector<RungResult>& rungs,
+std::vector<std::string> judge(std::vector<TradeMeasure>& measures, std::vector<RungResult>& rungs,
                                std::size_t reference) {
   std::vector<std::string> missing;
-  std::erase_if(measures, [&](const Measure& measure) {
+  std::erase_if(measures, [&](const TradeMeasure& measure) {
     if (!mean_of(rungs[reference], measure.name).empty()) return false;
     missing.push_back(measure.name);
     return true;
@@ -138,7 +138,7 @@ std::vector<std::string> judge(std::vector<Measure>& measures, std::vector<RungR
       rung.cost = mean_cost(rung.runs);
       bool whole = !measures.empty();
       double worst = 0;
-      for (const Measure& measure : measures) {
+      for (const TradeMeasure& measure : measures) {
         rung.judged.push_back(
             judged_of(measure, rung, mean_of(rungs[reference], measure.name)));
         const std::optional<double>& error = rung.judged.back().error;

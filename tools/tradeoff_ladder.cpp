@@ -77,13 +77,18 @@ class Ladder {
   /// the lattice fills.
   std::vector<std::string> spacing_by(double ratio) const {
     if (!base_.has_fluid()) return {};
-    const double across = std::round(base_.domain.width / base_.fluid.spacing * ratio);
+    const double now = std::round(base_.domain.width / base_.fluid.spacing);
+    const double across = std::round(now * ratio);
     const auto setting = [&](double count) {
       return set("fluid.spacing", base_.domain.width / std::max(1.0, count));
     };
-    for (const double off : {0, 1, -1, 2, -2, 3, -3, 4, -4})
-      if (resolve_with(scene_, {setting(across + off), "time.dt=auto"}).refused.empty())
-        return {setting(across + off)};
+    for (const double off : {0, 1, -1, 2, -2, 3, -3, 4, -4, 5, -5}) {
+      const double count = across + off;
+      // Never to the other side of what the scene has, nor back to it.
+      if (count >= 1 && (count - now) * (ratio - 1) > 0 &&
+          resolve_with(scene_, {setting(count), "time.dt=auto"}).refused.empty())
+        return {setting(count)};
+    }
     return {setting(across)};
   }
 
@@ -175,17 +180,35 @@ class Ladder {
 
 }  // namespace
 
+std::vector<std::string> settings_on_top(const std::vector<std::string>& base,
+                                         const std::vector<std::string>& settings) {
+  const auto key_of = [](const std::string& setting) {
+    const std::string key = setting.substr(0, setting.find('='));
+    return key.substr(0, key.find_last_not_of(' ') + 1);
+  };
+  std::vector<std::string> all;
+  for (const std::string& each : base) {
+    const bool replaced = std::any_of(settings.begin(), settings.end(), [&](const auto& other) {
+      return key_of(other) == key_of(each);
+    });
+    if (!replaced) all.push_back(each);
+  }
+  all.insert(all.end(), settings.begin(), settings.end());
+  return all;
+}
+
 TradeScene load_trade_scene(const std::string& file, std::vector<std::string> settings,
                             std::optional<double> until) {
   TradeScene scene;
   scene.file = file;
   scene.given = settings;
   // The ladder is built around `standard`, whatever level the file was written for.
-  settings.insert(settings.begin(), "scenario.fidelity=standard");
-  if (until) {
-    settings.push_back(set("time.until", *until));
-    settings.push_back("time.steps=0");
-  }
+  settings = settings_on_top({"scenario.fidelity=standard"}, settings);
+  const auto end_at = [&](double seconds) {
+    settings = settings_on_top(settings, {"time.steps=", set("time.until", seconds)});
+    std::erase(settings, "time.steps=");
+  };
+  if (until) end_at(*until);
   ScenarioOptions options;
   options.settings = settings;
   const ScenarioSource source = load_scenario(file, options);
@@ -193,11 +216,10 @@ TradeScene load_trade_scene(const std::string& file, std::vector<std::string> se
   scene.folder = std::filesystem::path(file).parent_path().string();
   scene.base = source.scenario;
   scene.until = source.scenario.time.until;
-  if (!until && source.scenario.time.steps > 0) {
+  if (source.scenario.time.steps > 0) {
     // Rungs of other steps shall end at the same time.
     scene.until = static_cast<double>(source.scenario.time.steps) * source.scenario.time.dt;
-    settings.push_back(set("time.until", scene.until));
-    settings.push_back("time.steps=0");
+    end_at(scene.until);
     scene.base.time.until = scene.until;
     scene.base.time.steps = 0;
   }
@@ -209,8 +231,7 @@ Resolved resolve_with(const TradeScene& scene, const std::vector<std::string>& s
   ScenarioOptions options;
   options.needs_length = true;
   options.folder = scene.folder;
-  options.settings = scene.settings;
-  options.settings.insert(options.settings.end(), settings.begin(), settings.end());
+  options.settings = settings_on_top(scene.settings, settings);
   try {
     return {read_scenario_text(scene.text, scene.file, options).scenario, ""};
   } catch (const ScenarioError& error) {

@@ -196,7 +196,8 @@ Quantity stiffness(const Scenario& base, bool thrown) {
   const double step = base.time.dt / static_cast<double>(n), tc = core::contact_time(base);
   // Contact times fall with k^-1/2, by Hertz with E^-2/5.
   const double power = hertz ? 2.5 : 2;
-  q.theory.push_back({"contact", fmt::format("tc0 = {:g} sub-steps", core::substeps_per_contact_min),
+  q.theory.push_back({"contact",
+                      fmt::format("tc0 = {:g} sub-steps", core::substeps_per_contact_min),
                       now * std::pow(tc / (core::substeps_per_contact_min * step), power)});
   if (!hertz)
     q.theory.push_back({"spring", "sub-step = 2 sqrt(m / k)",

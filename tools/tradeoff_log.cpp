@@ -55,7 +55,8 @@ std::vector<Recording> recordings() {
           {"deltas, keyframes 1024", deltas, 1, 1024}, {"every 4", deltas, 4, 256},
           {"every 16", deltas, 16, 256},               {"every 64", deltas, 64, 256},
           {"digests, keyframes 16", digests, 1, 16},   {"digests, keyframes 64", digests, 1, 64},
-          {"digests, keyframes 256", digests, 1, 256}, {"digests, keyframes 1024", digests, 1, 1024}};
+          {"digests, keyframes 256", digests, 1, 256},
+          {"digests, keyframes 1024", digests, 1, 1024}};
 }
 
 struct Recorded {

@@ -1,6 +1,7 @@
 // The built-in measures: what a run gave, in a number or a curve.
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <limits>
 
@@ -9,6 +10,7 @@
 #include "core/constants.h"
 #include "core/criteria.h"
 #include "core/math.h"
+#include "tools/measure.h"
 #include "tools/simulation_engine.h"
 #include "tools/tradeoff.h"
 #include "tools/validate_flow.h"
@@ -170,18 +172,18 @@ std::vector<double> optional_number(const std::optional<double>& value) {
   return value ? std::vector<double>{*value} : std::vector<double>{};
 }
 
-Measure of_summary(std::string name, std::string unit, std::string meaning,
+TradeMeasure of_summary(std::string name, std::string unit, std::string meaning,
                    std::function<std::vector<double>(const RunView&)> evaluate) {
-  return {std::move(name), std::move(unit), std::move(meaning), {}, 1, true, false,
+  return {std::move(name), std::move(unit), std::move(meaning), {}, 1, true, false, "",
           std::move(evaluate)};
 }
-Measure of_state(std::string name, std::string unit, std::string meaning,
+TradeMeasure of_state(std::string name, std::string unit, std::string meaning,
                  std::function<std::vector<double>(const RunView&)> evaluate) {
-  return {std::move(name), std::move(unit), std::move(meaning), {}, 1, false, false,
+  return {std::move(name), std::move(unit), std::move(meaning), {}, 1, false, false, "",
           std::move(evaluate)};
 }
 
-void add_grain_measures(const core::Scenario& s, std::vector<Measure>& all) {
+void add_grain_measures(const core::Scenario& s, std::vector<TradeMeasure>& all) {
   const auto dimension = static_cast<std::size_t>(s.domain.dimension);
   all.push_back(of_summary("settling_speed", "m/s",
                            "mean settling speed, second half of the time to the floor",
@@ -217,7 +219,7 @@ void add_grain_measures(const core::Scenario& s, std::vector<Measure>& all) {
                            });
                            return std::vector<double>{mean_height(run.first(), dimension) - last};
                          }));
-  Measure drift = of_summary("energy_drift", "",
+  TradeMeasure drift = of_summary("energy_drift", "",
                              "energy of the grains that appears from nowhere, over the largest "
                              "kinetic energy",
                              energy_drift);
@@ -226,7 +228,7 @@ void add_grain_measures(const core::Scenario& s, std::vector<Measure>& all) {
   all.push_back(std::move(drift));
 }
 
-void add_fluid_measures(const core::Scenario& s, std::vector<Measure>& all) {
+void add_fluid_measures(const core::Scenario& s, std::vector<TradeMeasure>& all) {
   const auto dimension = static_cast<std::size_t>(s.domain.dimension);
   all.push_back(of_state("kinetic_energy", "J", "of the fluid at the end", [](const RunView& run) {
     return std::vector<double>{run.at_end(kinetic_energy)};
@@ -250,7 +252,7 @@ void add_fluid_measures(const core::Scenario& s, std::vector<Measure>& all) {
                              })};
                            }));
   if (is_poiseuille(s)) {
-    Measure known = of_state("poiseuille", "",
+    TradeMeasure known = of_state("poiseuille", "",
                              "rms error of the profile over u_max, against the series of the "
                              "start-up",
                              poiseuille_error);
@@ -258,11 +260,49 @@ void add_fluid_measures(const core::Scenario& s, std::vector<Measure>& all) {
     all.push_back(std::move(known));
   }
   if (is_taylor_green(s)) {
-    Measure known = of_state("viscosity", "", "effective viscosity over nu, from the energy lost",
-                             taylor_green_viscosity);
+    TradeMeasure known = of_state("viscosity", "",
+                                  "effective viscosity over nu, from the energy lost",
+                                  taylor_green_viscosity);
     known.known = 1;
     all.push_back(std::move(known));
   }
+}
+
+TradeMeasure of_expression(const std::string& name, const std::string& text) {
+  const auto plain = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_';
+  };
+  if (name.empty() || !std::all_of(name.begin(), name.end(), plain))
+    throw UsageError(fmt::format(
+        "--measure: '{}' is no name; it may hold letters, digits and '_'", name));
+  try {
+    make_measure(name, text);
+  } catch (const ExpressionError& error) {
+    throw UsageError(
+        fmt::format("--measure {}: column {}: {}", name, error.column(), error.what()));
+  }
+  TradeMeasure measure;
+  measure.name = name;
+  measure.meaning = measure.expression = text;
+  return measure;
+}
+
+/// "NAME=VALUE": errors of that measure are relative to VALUE, or as they are where it is 0.
+void set_known(const std::string& text, std::vector<TradeMeasure>& measures) {
+  const std::size_t equals = text.find('=');
+  const std::string name = text.substr(0, equals);
+  const auto found = std::find_if(measures.begin(), measures.end(),
+                                  [&](const TradeMeasure& each) { return each.name == name; });
+  char* end = nullptr;
+  const std::string digits = equals == std::string::npos ? "" : text.substr(equals + 1);
+  const double value = std::strtod(digits.c_str(), &end);
+  if (digits.empty() || *end != '\0' || !std::isfinite(value))
+    throw UsageError(fmt::format("--known: expected NAME=VALUE with a number in SI, got '{}'",
+                                 text));
+  if (found == measures.end())
+    throw UsageError(fmt::format("--known: '{}' is not among the measures", name));
+  found->known = value;
+  found->scale = value == 0 ? 1 : std::abs(value);
 }
 
 }  // namespace
@@ -314,8 +354,8 @@ void RunView::read(bool summary, bool energies) {
                      });
 }
 
-std::vector<Measure> measures_of(const core::Scenario& scene) {
-  std::vector<Measure> all;
+std::vector<TradeMeasure> measures_of(const core::Scenario& scene) {
+  std::vector<TradeMeasure> all;
   if (has_moving_grains(scene)) add_grain_measures(scene, all);
   if (scene.has_fluid()) add_fluid_measures(scene, all);
   return all;
@@ -335,20 +375,30 @@ std::vector<std::string> default_measures(const core::Scenario& s) {
   return {"kinetic_energy", "max_speed"};
 }
 
-std::vector<Measure> choose_measures(const core::Scenario& scene,
-                                     const std::vector<std::string>& asked) {
-  const std::vector<Measure> all = measures_of(scene);
+std::vector<TradeMeasure> choose_measures(const core::Scenario& scene,
+                                          const std::vector<std::string>& asked,
+                                          const std::vector<std::string>& known) {
+  const std::vector<TradeMeasure> all = measures_of(scene);
   std::vector<std::string_view> names;
-  for (const Measure& each : all) names.push_back(each.name);
-  std::vector<Measure> chosen;
+  for (const TradeMeasure& each : all) names.push_back(each.name);
+  std::vector<TradeMeasure> chosen;
   for (const std::string& name : asked.empty() ? default_measures(scene) : asked) {
+    if (const std::size_t equals = name.find('='); equals != std::string::npos) {
+      chosen.push_back(of_expression(name.substr(0, equals), name.substr(equals + 1)));
+      continue;
+    }
     const auto found = std::find_if(all.begin(), all.end(),
-                                    [&](const Measure& each) { return each.name == name; });
+                                    [&](const TradeMeasure& each) { return each.name == name; });
     if (found == all.end())
-      throw UsageError(fmt::format("--measure: this scene has no '{}'; expected {}", name,
-                                   fmt::join(names, ", ")));
+      throw UsageError(fmt::format("--measure: this scene has no '{}'; expected NAME=EXPRESSION or "
+                                   "one of {}", name, fmt::join(names, ", ")));
     chosen.push_back(*found);
   }
+  for (std::size_t i = 0; i < chosen.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j)
+      if (chosen[i].name == chosen[j].name)
+        throw UsageError(fmt::format("--measure: '{}' is named twice", chosen[i].name));
+  for (const std::string& text : known) set_known(text, chosen);
   return chosen;
 }
 

@@ -18,7 +18,8 @@ using Json = nlohmann::ordered_json;
 std::string percent(double value, bool with_sign) {
   if (value == 0) return "0 %";
   const double shown = 100 * value;
-  const int digits = std::clamp(1 - static_cast<int>(std::floor(std::log10(std::abs(shown)))), 0, 4);
+  const int power = static_cast<int>(std::floor(std::log10(std::abs(shown))));
+  const int digits = std::clamp(1 - power, 0, 4);
   return with_sign ? fmt::format("{:+.{}f} %", shown, digits)
                    : fmt::format("{:.{}f} %", shown, digits);
 }
@@ -52,7 +53,7 @@ std::string aligned(const std::vector<std::vector<std::string>>& rows) {
 
 std::string reference_text(const TradeReport& report) {
   std::string against, known;
-  for (const Measure& measure : report.measures)
+  for (const TradeMeasure& measure : report.measures)
     (measure.known ? known : against) +=
         ((measure.known ? known : against).empty() ? "" : ", ") + measure.name;
   std::string text;
@@ -65,8 +66,8 @@ std::string reference_text(const TradeReport& report) {
 
 /// What the reference itself may still owe: how far the next best level is from it.
 std::string doubt_of(const TradeReport& report) {
-  const bool all_known = std::all_of(report.measures.begin(), report.measures.end(),
-                                     [](const Measure& each) { return each.known.has_value(); });
+  const auto is_known = [](const TradeMeasure& each) { return each.known.has_value(); };
+  const bool all_known = std::all_of(report.measures.begin(), report.measures.end(), is_known);
   if (all_known) return "";
   for (const RungResult& rung : report.rungs)
     if (rung.rung.name == "fine" && !rung.reference && rung.worst)
@@ -84,7 +85,7 @@ Json cost_json(const Cost& cost) {
           {"bytes", std::to_string(cost.bytes)}};
 }
 
-Json rung_json(const RungResult& rung, const std::vector<Measure>& measures) {
+Json rung_json(const RungResult& rung, const std::vector<TradeMeasure>& measures) {
   Json object{{"name", rung.rung.name},
               {"knob", rung.rung.knob},
               {"settings", rung.rung.settings},
@@ -178,7 +179,7 @@ std::string text_of(const TradeReport& report) {
     out += fmt::format("{}: did not happen in `{}`, left out\n", name,
                        report.rungs[report.reference].rung.name);
   std::vector<std::vector<std::string>> rows{{"", "CPU s", "wall s", "steps", "bytes"}};
-  for (const Measure& measure : report.measures) rows.front().push_back(measure.name);
+  for (const TradeMeasure& measure : report.measures) rows.front().push_back(measure.name);
   rows.front().push_back("worst");
   std::string notes;
   for (const RungResult& rung : report.rungs) {
@@ -207,8 +208,8 @@ std::string text_of(const TradeReport& report) {
                        percent(*rung.worst, false),
                        rung.reference ? ", the reference itself" : "");
     std::string command = fmt::format("  varve run {}", report.scene.file);
-    for (const auto* settings : {&report.scene.given, &rung.rung.settings})
-      for (const std::string& setting : *settings) command += " -s '" + setting + "'";
+    for (const std::string& setting : settings_on_top(report.scene.given, rung.rung.settings))
+      command += " -s '" + setting + "'";
     out += command + "\n";
   }
   return out;
@@ -223,7 +224,7 @@ std::string json_of(const TradeReport& report) {
               {"seeds", report.seeds},
               {"reference", report.rungs[report.reference].rung.name}};
   Json& measures = object["measures"] = Json::array();
-  for (const Measure& measure : report.measures)
+  for (const TradeMeasure& measure : report.measures)
     measures.push_back({{"name", measure.name},
                         {"unit", measure.unit},
                         {"meaning", measure.meaning},
@@ -241,7 +242,7 @@ std::string json_of(const TradeReport& report) {
 
 std::string csv_of(const TradeReport& report) {
   std::string out = "rung,knob,settings,status,cpu_s,wall_s,steps,bytes,worst_error,front";
-  for (const Measure& measure : report.measures)
+  for (const TradeMeasure& measure : report.measures)
     out += fmt::format(",{0},{0}_error,{0}_spread", measure.name);
   out += "\n";
   for (const RungResult& rung : report.rungs) {

@@ -22,6 +22,7 @@
 #include "core/criteria.h"
 #include "core/parameters.h"
 #include "io/digest.h"
+#include "tools/measure.h"
 #include "tools/probe.h"
 #include "tools/recording.h"
 #include "tools/signals.h"
@@ -57,7 +58,7 @@ std::string last_line(const std::string& text) {
 }
 
 /// What a result depends on: the scenario to the bit, the engine, the build, who measured.
-std::string content_key(const core::Scenario& resolved, const std::vector<Measure>& measures,
+std::string content_key(const core::Scenario& resolved, const std::vector<TradeMeasure>& measures,
                         const RunSettings& how) {
   std::string content = core::canonical_text(resolved);
   for (const core::ListedGrain& grain : resolved.grains.list)
@@ -68,7 +69,7 @@ std::string content_key(const core::Scenario& resolved, const std::vector<Measur
     if (name == "version" || name == "compiler" || name == "build" || name == "flags")
       content += fmt::format("{} {}\n", name, value);
   std::vector<std::string> names;
-  for (const Measure& each : measures) names.push_back(each.name + " " + each.meaning);
+  for (const TradeMeasure& each : measures) names.push_back(each.name + " " + each.meaning);
   std::sort(names.begin(), names.end());
   for (const std::string& name : names) content += name + "\n";
   return io::digest_text(content).hex().substr(0, 16);
@@ -160,17 +161,26 @@ std::string result_path(const std::string& folder, const std::string& key) {
 }
 
 void measure(const std::string& log_path, const core::Scenario& scenario, double until,
-             const std::vector<Measure>& measures, RungRun& run) {
+             const std::vector<TradeMeasure>& measures, RungRun& run) {
   const double began = process_cpu();
   const auto log = io::LogReader::open(log_path);
   RunView view(*log, scenario, until);
   bool summary = false, energies = false;
-  for (const Measure& each : measures) {
+  for (const TradeMeasure& each : measures) {
     summary = summary || each.needs_summary;
     energies = energies || each.needs_energies;
   }
   view.read(summary, energies);
-  for (const Measure& each : measures) {
+  std::vector<Measure> expressions;
+  for (const TradeMeasure& each : measures)
+    if (!each.expression.empty()) expressions.push_back(make_measure(each.name, each.expression));
+  if (!expressions.empty()) {
+    const Measured found = evaluate_measures(*log, scenario, expressions);
+    for (std::size_t k = 0; k < expressions.size(); ++k)
+      if (std::isfinite(found.values[k])) run.values[expressions[k].name] = {found.values[k]};
+  }
+  for (const TradeMeasure& each : measures) {
+    if (!each.evaluate) continue;
     std::vector<double> values = each.evaluate(view);
     // What is no number did not happen, as far as an error of it goes.
     for (const double value : values)
@@ -183,13 +193,14 @@ void measure(const std::string& log_path, const core::Scenario& scenario, double
 }  // namespace
 
 std::optional<Cost> finished_cost(const core::Scenario& resolved,
-                                  const std::vector<Measure>& measures, const RunSettings& how) {
+                                  const std::vector<TradeMeasure>& measures,
+                                  const RunSettings& how) {
   const auto run = stored(result_path(how.folder, content_key(resolved, measures, how)));
   return run ? std::optional<Cost>(run->cost) : std::nullopt;
 }
 
 RungRun run_rung(const TradeScene& scene, const std::vector<std::string>& settings,
-                 const core::Scenario& resolved, const std::vector<Measure>& measures,
+                 const core::Scenario& resolved, const std::vector<TradeMeasure>& measures,
                  const RunSettings& how) {
   const std::string key = content_key(resolved, measures, how);
   const std::string path = result_path(how.folder, key);
@@ -199,11 +210,10 @@ RungRun run_rung(const TradeScene& scene, const std::vector<std::string>& settin
   const std::string stem = (fs::path(path).parent_path() / key).string();
   const std::string log = stem + ".varve", output = stem + ".out", errors = stem + ".err";
   std::vector<std::string> words{executable_folder() + "/varve-run", scene.file};
-  for (const auto* list : {&scene.settings, &settings})
-    for (const std::string& each : *list) {
-      words.push_back("-s");
-      words.push_back(each);
-    }
+  for (const std::string& each : settings_on_top(scene.settings, settings)) {
+    words.push_back("-s");
+    words.push_back(each);
+  }
   for (const std::string& word :
        {std::string("-o"), log, std::string("--overwrite"), std::string("--threads"),
         std::to_string(how.threads), std::string("--json"), std::string("-q"),
