@@ -8,6 +8,7 @@
 
 #include "io/log_reader.h"
 #include "tools/cli.h"
+#include "tools/embedded_files.h"
 #include "tools/progress.h"
 
 namespace {
@@ -255,7 +256,7 @@ int run(const Invocation& invocation) {
     warn(fmt::format("{}: damaged; 'varve verify' says where, 'varve recover' saves what is whole",
                      log->path()));
   if (invocation.has("scenario")) {
-    print(log->genesis().scenario);
+    print(with_embedded(log->genesis().scenario, log->genesis().files));
     return exit_ok;
   }
   if (invocation.has("follow"))
@@ -277,7 +278,8 @@ Verb verb() {
       "  varve info column.varve --scenario > again.cfg\n"
       "  varve info column.varve --follow\n";
   out.options = {
-      {"scenario", "", "print the resolved scenario that reproduces the run, nothing else", false,
+      {"scenario", "", "print the resolved scenario that reproduces the run, with the files it\n"
+       "names below it, nothing else", false,
        ""},
       {"follow", "", "print a line whenever a growing log has new steps, until it is closed", false,
        ""},

@@ -15,6 +15,7 @@
 #include "core/grain_placement.h"
 #include "core/parameters.h"
 #include "tools/cli.h"
+#include "tools/embedded_files.h"
 #include "tools/scenario_levels.h"
 #include "tools/scenario_scan.h"
 
@@ -257,7 +258,7 @@ class ScenarioReader {
           content = text;
           return "";
         }
-      return "not embedded in the log";
+      return "not embedded with the scenario";
     }
     constexpr std::size_t bytes_max = std::size_t{1} << 26;
     const std::string path = listed_name(name, options);
@@ -382,10 +383,12 @@ std::string read_file(const std::string& path) {
     throw UsageError(fmt::format("{}: {}; expected a scenario file or one of the presets {}", path,
                                  std::strerror(errno), fmt::join(names, ", ")));
   }
-  constexpr std::size_t bytes_max = std::size_t{1} << 21;  // more than the scan takes
-  std::string text(bytes_max, '\0');
-  file.read(text.data(), static_cast<std::streamsize>(bytes_max));
-  text.resize(static_cast<std::size_t>(file.gcount()));
+  constexpr std::size_t bytes_max = std::size_t{1} << 27;  // more than scan and lists take
+  std::string text;
+  for (char block[65536]; text.size() < bytes_max && file;) {  // also of what has no size
+    file.read(block, sizeof block);
+    text.append(block, static_cast<std::size_t>(file.gcount()));
+  }
   if (file.bad()) throw UsageError(fmt::format("{}: could not be read", path));
   return text;
 }
@@ -408,8 +411,16 @@ ScenarioError::ScenarioError(std::vector<Diagnostic> found)
       }()),
       diagnostics_(std::move(found)) {}
 
-ScenarioSource read_scenario_text(std::string_view text, const std::string& name,
-                                  const ScenarioOptions& options) {
+ScenarioSource read_scenario_text(std::string_view whole, const std::string& name,
+                                  const ScenarioOptions& given) {
+  const SplitScenario split = split_embedded(whole);
+  if (split.wrong_line > 0)
+    throw ScenarioError({{name, split.wrong_line, 1,
+                          "expected a line of an embedded file ('#|' or '#:' and its text), or the "
+                          "next '#embedded file: NAME'"}});
+  const std::string_view text = split.scenario;
+  ScenarioOptions options = given;
+  if (!options.files && !split.files.empty()) options.files = &split.files;
   ScenarioReader reader;
   if (!options.resolved) reader.take_levels(text, options.settings);
   reader.take_text(text, name);
@@ -419,7 +430,7 @@ ScenarioSource read_scenario_text(std::string_view text, const std::string& name
   source.scenario = reader.finish(name, options);
   source.files = reader.files();
   source.name = name;
-  source.text = text;
+  source.text = whole;
   return source;
 }
 

@@ -43,6 +43,29 @@ TEST(PolydisperseScene, RunsReplaysForksAndDiffs) {
   EXPECT_THAT(verb(0, {"info", run}).output, HasSubstr("species.fine.diameter"));
 }
 
+TEST(GrainList, IsPrintedWithTheScenarioThatReproducesTheRun) {
+  for (const std::string end : {"\n", ""}) {
+    const TemporaryFolder folder;
+    const std::string run = folder / "run.varve", again = folder / "again.varve";
+    write(folder / "list.cfg", listed_scene);
+    write(folder / "list.csv", list.substr(0, list.size() - 1) + end);
+    verb(0, {"run", folder / "list.cfg", "-o", run});
+    write(folder / "again.cfg", verb(0, {"info", run, "--scenario"}).output);
+    std::filesystem::remove(folder / "list.csv");
+    verb(0, {"run", folder / "again.cfg", "-o", again});
+    EXPECT_EQ(json_verb(0, {"diff", run, again})["verdict"], "identical");
+    const Json a = json_verb(0, {"info", run}), b = json_verb(0, {"info", again});
+    EXPECT_EQ(a["run_id"], b["run_id"]);
+  }
+  const TemporaryFolder folder;
+  write(folder / "bad.cfg", listed_scene + "#embedded file: list.csv\n#|x,y\nwidth = 3 cm\n");
+  EXPECT_THAT(verb(3, {"check", folder / "bad.cfg"}).errors,
+              HasSubstr("expected a line of an embedded file"));
+  write(folder / "other.cfg", listed_scene + "#embedded file: other.csv\n#|x,y\n");
+  EXPECT_THAT(verb(3, {"check", folder / "other.cfg"}).errors,
+              HasSubstr("grains.file: 'list.csv': not embedded with the scenario"));
+}
+
 TEST(GrainList, IsReadBesideTheScenarioAndKeptInTheLog) {
   const TemporaryFolder folder;
   write(folder / "list.cfg", listed_scene);
