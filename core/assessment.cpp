@@ -215,6 +215,10 @@ class Assessor {
       warn("coupling.drag", law + " is for Re " + range + "; Re " + rough_number(re) +
                                 " is expected");
     };
+    if (s_.coupling.self_disturbance && re > 1)
+      warn("coupling.self_disturbance",
+           "is for slow flow, Re below 1, where disturbances do not drift away; Re " +
+               rough_number(re) + " is expected");
     if (s_.coupling.drag == Drag::stokes && re > 1) outside("stokes", "below 1");
     if (s_.coupling.drag == Drag::schiller_naumann && re > 1000)
       outside("schiller_naumann", "below 1000");
@@ -300,6 +304,9 @@ std::vector<ModelUse> models_of(const Scenario& s) {
   add("conjugate pressure", both && s.coupling.pressure_force == PressureForce::conjugate,
       both ? setting("coupling.pressure_force", s) : alone.empty() ? setting("coupling.mode", s)
                                                                    : alone);
+  add("self-disturbance corrected", both && s.coupling.self_disturbance,
+      both ? setting("coupling.self_disturbance", s) : alone.empty() ? setting("coupling.mode", s)
+                                                                     : alone);
   add("drag", coupled,
       !alone.empty() ? alone : setting(coupled ? "coupling.drag" : "coupling.mode", s));
   const bool stepped = moving && substeps(s) > 1;

@@ -19,9 +19,13 @@ struct SpeciesConstants {
   double volume = 0, mass = 0;      // [m3], [kg] (m2 and kg/m in 2D)
   double inertia = 0;               // [kg m2] 1/2 m R^2 disc, 2/5 m R^2 sphere
   double added_mass = 0;            // [kg] of fluid that has to move with it
+  double slip_factor = 1;           // [-] of the slip that is sampled: E11b
   Vec<double, D> weight = Vec<double, D>::Zero();  // [N] submerged in the excess form
 };
-/// All but added mass and weight.
+/// E11b: what the slip without a grain's own disturbance is over the slip that it samples, in slow
+/// flow far from walls: 1 / (1 - 1.0737 R / hc). Infinite or negative where hc is too short.
+double undisturbed_slip(double radius, double coupling_length);
+/// All but added mass, slip factor and weight.
 template <int D>
 SpeciesConstants<D> species_constants(double diameter, double density);
 

@@ -309,9 +309,9 @@ GrainForce<D> CouplingStage<D, P>::force_on(const Constants<D>& c, const State<D
   const Vec<double, D> slip = f.fluid_velocity - v;
   double speed2 = 0;
   for (int k = 0; k < D; ++k) speed2 += slip[k] * slip[k];
-  const Slip argument{std::sqrt(speed2), f.porosity, one.diameter, c.reference_density,
-                      c.viscosity};
-  f.coefficient = drag_coefficient<D>(law, argument);
+  const Slip argument{one.slip_factor * std::sqrt(speed2), f.porosity, one.diameter,
+                      c.reference_density, c.viscosity};
+  f.coefficient = one.slip_factor * drag_coefficient<D>(law, argument);
   return f;
 }
 

@@ -298,6 +298,8 @@ void add_coupling(std::vector<Parameter>& table) {
   add(real("coupling.added_mass", "", pure, {0, 2}, given, Change::never,
            VARVE_REAL(coupling.added_mass),
            "fluid that a grain has to accelerate, over the displaced; 0.5 sphere, 1 disc; 0: off"));
+  add(flag("coupling.self_disturbance", Change::never, VARVE_FLAG(coupling.self_disturbance),
+           "corrects the slip for the flow a grain itself sets up (3D; slow, dilute, off walls)"));
 
   add(real("time.cfl", "", pure, {0, 1, true}, given, Change::never, VARVE_REAL(time.cfl),
            "dt over smoothing length / sound speed"));

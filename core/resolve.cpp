@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/constants.h"
 #include "core/criteria.h"
 #include "core/kernel.h"
 #include "core/math.h"
@@ -259,6 +260,7 @@ class Resolver {
     if (!s_.is_coupled()) return;
     if (!flat && s_.coupling.drag == Drag::cylinder)
       problem("coupling.drag", "'cylinder' is a law for discs; expected another one in 3D");
+    check_self_disturbance();
     // Porosity at the centre of a lone grain is 1 - V W(0): it must stay positive.
     constexpr Kernel widest = Kernel::wendland_c2;
     const double d = largest_diameter(s_);
@@ -274,6 +276,24 @@ class Resolver {
               number_text(s_.coupling.length) + " m is " + rough_number(s_.coupling.length / d) +
                   " d: the porosity inside a grain would not be positive; smallest safe value " +
                   number_above(least * 1.001) + " m");
+  }
+
+  /// E11b is for the flow around a sphere, which falls off with distance, and for slips that the
+  /// sphere leaves more than a third of.
+  void check_self_disturbance() {
+    if (!s_.coupling.self_disturbance) return;
+    constexpr double factor_max = 3;
+    if (s_.domain.dimension == 2)
+      problem("coupling.self_disturbance", "'on' needs domain.dimension = 3; expected off");
+    else if (s_.coupling.mode != CouplingMode::two_way)
+      problem("coupling.self_disturbance",
+              "'on' in one-way coupling, where grains disturb nothing; expected off");
+    const double factor = undisturbed_slip(0.5 * largest_diameter(s_), s_.coupling.length);
+    if (!(factor > 0 && factor <= factor_max))
+      problem("coupling.length",
+              number_text(s_.coupling.length) + " m is too short for coupling.self_disturbance: a "
+              "grain would see less than a third of its slip; smallest safe value " +
+                  number_above(0.5 * 1.0737 * 1.5 * largest_diameter(s_)) + " m");
   }
 
   void check_periodic() {

@@ -142,6 +142,7 @@ struct Coupling {
   double porosity_floor = automatic;  // [-] 0.30 in 2D, 0.25 in 3D
   bool exclude_own_volume = true;
   double added_mass = 0;  // [-] of the displaced fluid's mass
+  bool self_disturbance = false;  // slip corrected for the flow that a grain itself sets up; 3D
 };
 
 struct Time {

@@ -219,6 +219,19 @@ TEST(CouplingPorosity, FeltByALoneGrainIsOneToTheBit) {
   EXPECT_NEAR(bed.force().porosity, 1 - 7.0 / 16, 1e-14);
 }
 
+TEST(CouplingDrag, OfACorrectedSlipIsThatOfTheSlipWithoutTheDisturbance) {
+  const double slip = 0.05, factor = undisturbed_slip(1.25e-3, 2.5e-3);
+  EXPECT_NEAR(factor, 1 / (1 - 0.53685), 1e-12);
+  Bed bed(30, 30);
+  bed.add({15.2e-3, 15.4e-3}, {0, factor * slip});
+  bed.find_forces();
+  const double wanted = bed.force().coefficient * factor * slip;  // K(u) u at the true slip
+  bed.c.species[0].slip_factor = factor;
+  bed.state.grains.velocity[0] = {0, slip};
+  bed.find_forces();
+  EXPECT_NEAR(bed.force().coefficient * slip, wanted, 1e-12 * wanted);
+}
+
 TEST(CouplingPorosity, FeltInAPackedArrayIsNearThatOfTheArray) {
   // Leaving the own volume out alone would say 0.65; divided by what the others could fill at most,
   // the array's 0.2146 comes back.

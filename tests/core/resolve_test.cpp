@@ -381,6 +381,22 @@ TEST(Resolve, WhatOnlySpaceHasIsRefusedInThePlane) {
     EXPECT_THAT(text, HasSubstr(std::string(key) + ": has no meaning in 2D"));
 }
 
+TEST(Resolve, AGrainsOwnDisturbanceIsCorrectedInSpaceAndTwoWayOnly) {
+  Scenario s = disc();
+  s.coupling.self_disturbance = true;
+  EXPECT_THAT(problems_of(s), HasSubstr("coupling.self_disturbance: 'on' needs domain.dimension"));
+  s.domain.dimension = 3;
+  s.domain.depth = 0.02;
+  EXPECT_EQ(problems_of(s), "");
+  s.coupling.length = 0.75 * s.grains.diameter;  // least 0.805 d: 1 - 1.0737 R / hc = 1 / 3
+  EXPECT_THAT(problems_of(s), HasSubstr("0.001875 m is too short for coupling.self_disturbance"));
+  EXPECT_THAT(problems_of(s), HasSubstr("smallest safe value 0.00201"));
+  s.coupling.length = 0.8055 * s.grains.diameter;
+  EXPECT_EQ(problems_of(s), "");
+  s.coupling.mode = CouplingMode::one_way;
+  EXPECT_THAT(problems_of(s), HasSubstr("'on' in one-way coupling"));
+}
+
 TEST(Resolve, APipeIsRoundAndHoldsItsGrains) {
   Scenario s = sphere();
   s.domain.shape = Shape::pipe;
