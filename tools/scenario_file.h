@@ -44,14 +44,14 @@ struct ScenarioSource {
 };
 
 struct ScenarioOptions {
-  std::vector<std::string> settings;  ///< "KEY=VALUE" of -s, in order; they win over the file
+  std::vector<std::string> settings{};  ///< "KEY=VALUE" of -s, in order; they win over the file
   /// time.until or time.steps must be given. A caller that sets the length of the run says no.
   bool needs_length = true;
   /// The text is a resolved scenario's canonical one (a genesis): nothing is derived or limited
   /// again. A fork's scenario need not be one that a fresh run could start with.
   bool resolved = false;
   /// Folder of the files that the scenario names; "" is the working folder.
-  std::string folder;
+  std::string folder{};
   /// Where those files are held in memory instead (a genesis): name, content.
   const std::vector<std::pair<std::string, std::string>>* files = nullptr;
 };
