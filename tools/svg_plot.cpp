@@ -90,9 +90,11 @@ std::string series_of(const SvgPlot& plot, const SvgSeries& series, const char* 
     path += fmt::format("{}{:.1f} {:.1f}", pen_down ? " L " : (path.empty() ? "M " : " M "), px,
                         py);
     pen_down = true;
+    const std::string tip = k < series.tips.size() ? xml_text(series.tips[k]) : "";
     if (series.markers)
       marks += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3.5\" fill=\"{}\" "
-                           "stroke=\"{}\"/>\n", px, py, series.hollow ? "white" : colour, colour);
+                           "stroke=\"{}\"><title>{}</title></circle>\n", px, py,
+                           series.hollow ? "white" : colour, colour, tip);
     if (k < series.labels.size() && !series.labels[k].empty())
       marks += fmt::format("<text class=\"label\" x=\"{:.1f}\" y=\"{:.1f}\">{}</text>\n", px + 6,
                            py - 4, xml_text(series.labels[k]));

@@ -13,6 +13,7 @@ struct SvgSeries {
   std::vector<std::string> labels;                 ///< beside the points; may be empty
   bool line = true, markers = false;
   bool hollow = false;                             ///< markers
+  std::vector<std::string> tips = {};              ///< shown when a marker is pointed at
 };
 
 struct SvgPlot {

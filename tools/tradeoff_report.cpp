@@ -287,7 +287,9 @@ std::string svg_of(const TradeReport& report) {
   for (const RungResult* rung : order) {
     SvgSeries& series = rung->front ? front : others;
     series.points.emplace_back(rung->cost.cpu_s, *rung->worst);
-    series.labels.push_back(rung->rung.name);
+    // Beaten ones lie close together: only levels are named among them.
+    series.labels.push_back(rung->front || rung->rung.knob == "level" ? rung->rung.name : "");
+    series.tips.push_back(rung->rung.name);
   }
   plot.series = {front, others};
   return svg_of(plot);
