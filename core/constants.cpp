@@ -38,12 +38,6 @@ void Constants<D>::set_pairs() {
   }
 }
 
-/// A Stokeslet that is spread and sampled by the Wendland kernel moves the fluid at its place by
-/// 1.0737 F / (6 pi mu hc); F = 6 pi mu R u without it.
-double undisturbed_slip(double radius, double coupling_length) {
-  return 1 / (1 - 1.0737 * radius / coupling_length);
-}
-
 namespace {
 
 template <int D>

@@ -22,9 +22,6 @@ struct SpeciesConstants {
   double slip_factor = 1;           // [-] of the slip that is sampled: E11b
   Vec<double, D> weight = Vec<double, D>::Zero();  // [N] submerged in the excess form
 };
-/// E11b: what the slip without a grain's own disturbance is over the slip that it samples, in slow
-/// flow far from walls: 1 / (1 - 1.0737 R / hc). Infinite or negative where hc is too short.
-double undisturbed_slip(double radius, double coupling_length);
 /// All but added mass, slip factor and weight.
 template <int D>
 SpeciesConstants<D> species_constants(double diameter, double density);

@@ -103,6 +103,12 @@ double kernel_support(const Scenario& s) {
 
 double coupling_radius(const Scenario& s) { return 2 * s.coupling.length; }
 
+/// A Stokeslet that is spread and sampled by the Wendland kernel moves the fluid at its place by
+/// 1.0737 F / (6 pi mu hc); F = 6 pi mu R u without it.
+double undisturbed_slip(double radius, double coupling_length) {
+  return 1 / (1 - 1.0737 * radius / coupling_length);
+}
+
 double periodic_minimum(const Scenario& s) {
   double least = 0;
   if (s.has_fluid()) least = kernel_support(s) + list_skin_ratio * smoothing_length(s);

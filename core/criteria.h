@@ -19,6 +19,9 @@ double kernel_support(const Scenario& scenario);
 /// [m] Rc = 2 hc: radius within which a grain and a fluid particle see each other. Needs
 /// coupling.length.
 double coupling_radius(const Scenario& scenario);
+/// E11b: what the slip without a grain's own disturbance is over the slip that it samples, in slow
+/// flow far from walls: 1 / (1 - 1.0737 R / hc). Infinite or negative where hc is too short.
+double undisturbed_slip(double radius, double coupling_length);
 /// The most that a neighbour list may add to a radius, over h where there is fluid, else over the
 /// diameter of the grains.
 inline constexpr double list_skin_ratio = 0.25;

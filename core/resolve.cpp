@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/constants.h"
 #include "core/criteria.h"
 #include "core/kernel.h"
 #include "core/math.h"

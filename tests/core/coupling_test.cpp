@@ -7,6 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "core/criteria.h"
 #include "core/kernel.h"
 #include "core/math.h"
 #include "core/random.h"
