@@ -21,6 +21,7 @@
 #include "tools/study_plan.h"
 #include "tools/study_pool.h"
 #include "tools/study_report.h"
+#include "tools/study_slurm.h"
 #include "tools/study_store.h"
 #include "tools/study_values.h"
 
@@ -34,6 +35,7 @@ using Json = nlohmann::ordered_json;
 class FolderLock {
  public:
   explicit FolderLock(const std::string& folder) : path_((fs::path(folder) / "lock").string()) {
+    fs::create_directories(folder);
     file_ = open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
     if (file_ < 0)
       throw ToolError(exit_output, fmt::format("{}: {}", path_, std::strerror(errno)));
@@ -224,10 +226,35 @@ void make_folder(const Request& request) {
                     fmt::format("{}: {}", request.store.folder(), failed.message()));
 }
 
+/// One member, of a job array: others may be at work in the same folder.
+int run_one(const Request& request, const std::string& id) {
+  const std::vector<StudyMember>& members = request.plan.members;
+  const auto member = std::find_if(members.begin(), members.end(),
+                                   [&](const StudyMember& each) { return each.id == id; });
+  if (member == members.end())
+    throw UsageError(fmt::format("--member: {} has no member '{}'; varve study plan lists them",
+                                 request.plan.file.path, id));
+  const FolderLock lock(request.store.member_folder(id));
+  return run_selection(request, {static_cast<std::size_t>(member - members.begin())});
+}
+
+int write_slurm(const Request& request) {
+  request.store.write_plan();
+  const std::vector<std::string> paths = write_slurm_scripts(
+      request.plan, request.store, request.selection,
+      {executable_folder() + "/varve-study", threads_option(request.invocation)});
+  for (const std::string& path : paths) note(request.invocation.globals, "wrote " + path);
+  if (paths.empty()) note(request.invocation.globals, "nothing is left to do");
+  return exit_ok;
+}
+
 int run(const Request& request) {
   if (request.invocation.has("dry-run"))
     return show_plan(request, true, jobs_of(request.invocation));
   make_folder(request);
+  if (request.invocation.has("member"))
+    return run_one(request, request.invocation.value("member"));
+  if (request.invocation.has("slurm")) return write_slurm(request);
   const FolderLock lock(request.store.folder());
   request.store.write_plan();
   return run_selection(request, request.selection);
@@ -400,6 +427,8 @@ Verb verb() {
        ""},
       {"plots", "DIR", "of report: SVG files that the Markdown shows", false, ""},
       {"dry-run", "", "of plan and run: print the plan, expected time and bytes", false, ""},
+      {"slurm", "", "of run: write scripts of job arrays instead of running", false, ""},
+      {"member", "ID", "of run: this member alone, as a task of such an array", false, ""},
       threads_spec(),
       {"help-format", "", "the format of study files", false, ""},
   };

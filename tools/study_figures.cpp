@@ -171,6 +171,7 @@ void add_figure(Document& document, const StudyData& data, const StudyFigure& fi
   std::vector<const StudyMeasure*> quality = measures_named(file, {}, true);
   drop_empty(data, ensembles, measures);
   drop_empty(data, ensembles, quality);
+  if (measures.empty() && quality.empty()) document.text("Nothing of it has been run.");
   if (!measures.empty()) document.table(table_of(data, ensembles, measures));
   const Axis axis = axis_of(data, figure.x, ensembles);
   for (const StudyMeasure* each : measures)

@@ -181,7 +181,9 @@ class Planner {
       for (Diagnostic diagnostic : wrong.diagnostics()) {
         const auto number = static_cast<std::size_t>(diagnostic.line);
         if (diagnostic.source == "<command line>" && number >= 1 && number <= settings.size())
-          diagnostic = at_value(settings[number - 1].place, diagnostic.text);
+          diagnostic = diagnostic.text.starts_with("unknown key")
+                           ? at_key(settings[number - 1].place, diagnostic.text)
+                           : at_value(settings[number - 1].place, diagnostic.text);
         error(std::move(diagnostic));
       }
       return false;

@@ -130,7 +130,10 @@ class Pool {
   /// A fork whose parent failed: a row of its own that says so.
   void fail_orphan(const StudyMember& member) {
     const auto parent = store_.read_row(plan_.members[*member.parent].id);
-    if (!parent || !parent->failed) return;  // it was interrupted: the fork waits with it
+    if (!parent || !parent->failed) {  // it was interrupted: the fork waits with it
+      ++result_.interrupted;
+      return;
+    }
     StudyRow row;
     row.id = member.id;
     row.failed = true;

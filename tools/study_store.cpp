@@ -12,6 +12,7 @@
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "core/units.h"
@@ -55,17 +56,25 @@ std::string point_text(const std::vector<double>& point) {
   return text;
 }
 
+/// Permissions that new files do not get; mkstemp gives them to nobody but us.
+mode_t current_mask() {
+  const mode_t mask = umask(0);
+  umask(mask);
+  return mask;
+}
+
 }  // namespace
 
 void write_whole(const std::string& path, const std::string& text) {
-  const std::string beside = fmt::format("{}.{}.new", path, getpid());
+  std::string beside = path + ".XXXXXX";
   const auto fail = [&] {
     const std::string why = std::strerror(errno);
     std::remove(beside.c_str());
     throw ToolError(exit_output, fmt::format("{}: could not be written: {}", path, why));
   };
-  std::FILE* file = std::fopen(beside.c_str(), "wb");
-  if (!file) fail();
+  const int opened = mkstemp(beside.data());
+  std::FILE* file = opened < 0 ? nullptr : fdopen(opened, "wb");
+  if (!file || fchmod(opened, 0666 & ~current_mask()) != 0) fail();
   const bool written = std::fwrite(text.data(), 1, text.size(), file) == text.size() &&
                        std::fflush(file) == 0 && fsync(fileno(file)) == 0;
   if ((std::fclose(file) != 0) || !written) fail();
@@ -147,7 +156,20 @@ std::vector<Curve> StudyStore::curves_of(const std::string& id) const {
 }
 
 std::optional<StudyRow> StudyStore::read_row(const std::string& id) const {
-  const auto object = read_json((fs::path(member_folder(id)) / "row.json").string());
+  const fs::path path = fs::path(member_folder(id)) / "row.json";
+  std::error_code error;
+  const auto written = fs::last_write_time(path, error);
+  if (error) return std::nullopt;
+  // Tables are made anew whenever a member ends: what has not changed is not read again.
+  const auto known = rows_.find(id);
+  if (known != rows_.end() && known->second.first == written) return known->second.second;
+  std::optional<StudyRow> row = parse_row(id, path.string());
+  if (row) rows_[id] = {written, *row};
+  return row;
+}
+
+std::optional<StudyRow> StudyStore::parse_row(const std::string& id, const std::string& path) {
+  const auto object = read_json(path);
   if (!object) return std::nullopt;
   try {
     StudyRow row;
@@ -251,9 +273,9 @@ void StudyStore::tidy() const {
   for (const StudyMember& member : plan_.members) {
     if (!member.parent) continue;
     const std::string& parent = plan_.members[*member.parent].id;
-    if (awaited.count(parent) > 0) continue;
-    const auto row = read_row(member.id);
-    if (!row) awaited.insert(parent);
+    if (awaited.count(parent) > 0 || !fs::exists(log_path(parent))) continue;
+    const MemberState state = state_of(member);
+    if (state != MemberState::done && state != MemberState::failed) awaited.insert(parent);
   }
   for (const StudyMember& member : plan_.members) {
     if (member.keep == Keep::log || awaited.count(member.id) > 0) continue;

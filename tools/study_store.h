@@ -3,10 +3,12 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <map>
 #include <optional>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tools/measure.h"
@@ -77,8 +79,11 @@ class StudyStore {
   void write_results() const;
 
  private:
+  static std::optional<StudyRow> parse_row(const std::string& id, const std::string& path);
+
   const StudyPlan& plan_;
   std::string folder_;
+  mutable std::map<std::string, std::pair<std::filesystem::file_time_type, StudyRow>> rows_;
 };
 
 /// Writes a file whole, or not at all. ToolError(74) if it can't be.
