@@ -159,7 +159,7 @@ std::optional<Sensitivity> sensitivity_of(const std::vector<Sample>& samples) {
     result.slope = fit->slope;
     result.half_width = fit->half_width;
     result.effect = std::abs(fit->slope) * (*most - *least);
-    result.elasticity = mean_y == 0 ? none : fit->slope * mean_x / mean_y;
+    result.elasticity = mean_y == 0 || fit->slope == 0 ? none : fit->slope * mean_x / mean_y;
     return result;
   }
   std::map<std::string, std::vector<double>> by_word;

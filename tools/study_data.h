@@ -64,11 +64,11 @@ struct Sensitivity {
   std::size_t members = 0;
   bool numeric = false;          ///< else only `effect` and `spread` mean something
   double slope = 0, half_width = 0;  ///< of a straight line, 95 % (Student t); NaN: no interval
-  double elasticity = 0;         ///< slope times mean key over mean measure
+  double elasticity = 0;         ///< slope times mean key over mean measure; NaN: no slope
   double effect = 0;             ///< slope times range; of words: range of the means
   double spread = 0;             ///< over seeds, pooled over points; NaN: no seeds
   std::size_t rank = 0;          ///< by |elasticity| among the numeric keys of all cases, from 1
-  bool below_noise() const { return effect < 2 * spread; }
+  bool below_noise() const { return effect <= 2 * spread; }
 };
 /// Of one measure over all cases that vary anything; the keys that contact damping and the domain's
 /// width go by come first.

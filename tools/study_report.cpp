@@ -90,8 +90,9 @@ void add_claims(Document& document, const StudyData& data,
 
 Row sensitivity_row(const StudyData& data, const Sensitivity& each) {
   const bool has_interval = each.numeric && !std::isnan(each.half_width);
-  std::string noise = "no seeds";
-  if (!std::isnan(each.spread)) noise = each.below_noise() ? "below noise" : "beyond noise";
+  std::string noise = each.effect == 0 ? "no effect" : "no seeds";
+  if (each.effect != 0 && !std::isnan(each.spread))
+    noise = each.below_noise() ? "below noise" : "beyond noise";
   return {each.key,
           data.plan().file.cases[each.case_index].name,
           std::to_string(each.members),
@@ -103,7 +104,7 @@ Row sensitivity_row(const StudyData& data, const Sensitivity& each) {
           each.rank > 0 ? std::to_string(each.rank) : "-",
           short_number(each.effect),
           short_number(each.spread),
-          {noise, each.below_noise()}};
+          {noise, noise == "below noise"}};
 }
 
 void add_sensitivities(Document& document, const StudyData& data) {

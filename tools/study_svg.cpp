@@ -10,7 +10,7 @@
 namespace varve::tools {
 namespace {
 
-constexpr double width = 640, height = 380, left = 74, right = 150, top = 34, bottom = 56;
+constexpr double axis_length = 430, height = 380, left = 74, top = 34, bottom = 56;
 constexpr std::array<const char*, 10> colours = {"#1b6ca8", "#d1495b", "#2e8b57", "#b8860b",
                                                  "#6a4c93", "#008b8b", "#8b4513", "#c71585",
                                                  "#556b2f", "#444444"};
@@ -43,6 +43,9 @@ double spread_at(const PlotSeries& series, std::size_t i) {
 class Drawing {
  public:
   explicit Drawing(const Plot& plot) : plot_(plot) {
+    std::size_t longest = 0;
+    for (const PlotSeries& series : plot.series) longest = std::max(longest, series.name.size());
+    if (longest > 0) right_ = 44 + 6 * static_cast<double>(longest);
     for (const PlotSeries& series : plot.series)
       for (std::size_t i = 0; i < series.x.size(); ++i) {
         if (std::isnan(series.y[i])) continue;
@@ -65,7 +68,7 @@ class Drawing {
     out_ = fmt::format("<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {} {}\" "
                        "width=\"{}\" height=\"{}\" font-family=\"sans-serif\" font-size=\"12\" "
                        "role=\"img\">\n<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n",
-                       width, height, width, height);
+                       width(), height, width(), height);
     text(left, 20, plot_.title, "start", "font-size=\"14\"");
     axes();
     for (std::size_t i = 0; i < plot_.series.size(); ++i) series(i);
@@ -74,8 +77,9 @@ class Drawing {
   }
 
  private:
+  double width() const { return left + axis_length + right_; }
   double px(double x) const {
-    return left + (x - x_.least) / (x_.most - x_.least) * (width - left - right);
+    return left + (x - x_.least) / (x_.most - x_.least) * axis_length;
   }
   double py(double y) const {
     return height - bottom - (y - y_.least) / (y_.most - y_.least) * (height - top - bottom);
@@ -93,7 +97,7 @@ class Drawing {
   }
 
   void axes() {
-    const double floor = height - bottom, end = width - right;
+    const double floor = height - bottom, end = left + axis_length;
     for (const double tick : axis_ticks(y_.least, y_.most, 6)) {
       line(left, py(tick), end, py(tick), "#dddddd", 1);
       text(left - 6, py(tick) + 4, fmt::format("{:.4g}", tick), "end");
@@ -151,16 +155,17 @@ class Drawing {
   }
 
   void legend() {
-    if (plot_.series.size() < 2 && (plot_.series.empty() || plot_.series[0].name.empty())) return;
+    if (right_ <= 20) return;
     constexpr std::size_t shown = 18;
     for (std::size_t i = 0; i < std::min(shown, plot_.series.size()); ++i) {
       const double y = top + 8 + 17 * static_cast<double>(i);
-      line(width - right + 10, y, width - right + 26, y, colours[i % colours.size()], 3);
-      text(width - right + 31, y + 4, plot_.series[i].name, "start", "font-size=\"10\"");
+      line(left + axis_length + 10, y, left + axis_length + 26, y, colours[i % colours.size()], 3);
+      text(left + axis_length + 31, y + 4, plot_.series[i].name, "start", "font-size=\"10\"");
     }
   }
 
   const Plot& plot_;
+  double right_ = 20;  ///< beside the axes: the legend
   Range x_, y_;
   std::string out_;
 };
