@@ -8,6 +8,9 @@
 namespace varve::core {
 
 namespace {
+// Fluid particles, most of which no grain is near, below which a second thread is not worth waking.
+constexpr std::size_t few_items = 2048;
+
 template <int D>
 using CouplingKernel = SmoothingKernel<D, Kernel::wendland_c2, double>;
 
@@ -178,7 +181,8 @@ void CouplingStage<D, P>::porosity(const Constants<D>& c, const State<D, P>& sta
   });
   // Clamps are counted per fluid particle and added up in one fixed order; integers have no order.
   std::vector<std::uint64_t> clamps(workers.count(), 0);
-  workers.run(state.fluid.size(), 64, [&](std::size_t begin, std::size_t end, unsigned thread) {
+  workers.run(state.fluid.size(), few_items, [&](std::size_t begin, std::size_t end,
+                                                  unsigned thread) {
     for (std::size_t a = begin; a < end; ++a) {
       double solid = 0;
       for (std::uint32_t k = near_start_[a]; k < near_start_[a + 1]; ++k)
@@ -228,7 +232,7 @@ void CouplingStage<D, P>::share_pressure(const Constants<D>& c, std::span<const 
       if (weights > 0) mean_pressure_[i] = sum / weights;
     }
   });
-  workers.run(push.size(), 64, [&](std::size_t begin, std::size_t end, unsigned) {
+  workers.run(push.size(), few_items, [&](std::size_t begin, std::size_t end, unsigned) {
     for (std::size_t a = begin; a < end; ++a) {
       double q = static_cast<double>(floored[a]) * static_cast<double>(pressure[a]);
       for (std::uint32_t k = near_start_[a]; k < near_start_[a + 1]; ++k)

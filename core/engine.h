@@ -96,6 +96,8 @@ class Engine final : public Simulation {
   void sum_work();
   void move_fluid();
   void check_grains() const;
+  bool grain_is_good(std::size_t i, double limit) const;
+  void report_grain(std::size_t i, double limit) const;
   void commit();
   void record_tables();
   void record_grain_tables();

@@ -17,6 +17,7 @@ Engine<D, P>::Engine(const Scenario& scenario, State<D, P> state, const RunOptio
                            ? best_instruction_set()
                            : std::min(best_instruction_set(),
                                       static_cast<InstructionSet>(options.instruction_set))),
+      contacts_(instruction_set_),
       options_(options) {
   require_exact_arithmetic(workers_);
   adopt_scenario();

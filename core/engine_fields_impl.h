@@ -222,6 +222,13 @@ void Engine<D, P>::build_grain_tables() {
 template <int D, class P>
 TableSpan Engine<D, P>::table(std::size_t index) const {
   TableSpan span{table_rows_[index], {}};
+  if (has_grains() && index == 0) {
+    // The contacts' own arrays, which are laid out as the table is. None after a step that failed.
+    span.rows = std::min<std::uint64_t>(span.rows, contacts_.record_count());
+    span.columns = contacts_.record_columns();
+    for (auto& column : span.columns) column = column.first(span.rows == 0 ? 0 : column.size());
+    return span;
+  }
   for (const auto& column : table_bytes_[index]) span.columns.push_back(column);
   return span;
 }
@@ -245,24 +252,7 @@ void Engine<D, P>::record_tables() {
 template <int D, class P>
 void Engine<D, P>::record_grain_tables() {
   using engine_detail::append;
-  auto& columns = table_bytes_[0];
-  const auto& records = contacts_.records();
-  table_rows_[0] = c_.frozen ? 0 : records.size();
-  for (std::size_t r = 0; r < table_rows_[0]; ++r) {
-    const ContactRecord<D>& record = records[r];
-    std::size_t k = 0;
-    append(columns[k++], record.key.grain);
-    append(columns[k++], static_cast<std::uint8_t>(record.key.kind));
-    append(columns[k++], record.key.partner);
-    append(columns[k++], static_cast<std::uint8_t>(record.begin));
-    append(columns[k++], static_cast<std::uint8_t>(record.end));
-    append(columns[k++], record.peak_force);
-    append(columns[k++], record.peak_overlap);
-    for (int a = 0; a < D; ++a) append(columns[k++], record.impulse[a]);
-    for (const double value : {record.impact_speed, record.rebound_speed, record.normal_loss,
-                               record.tangential_loss, record.friction_loss})
-      append(columns[k++], value);
-  }
+  table_rows_[0] = c_.frozen ? 0 : contacts_.record_count();
   if (!coupled()) return;
   table_rows_[1] = 1;
   append(table_bytes_[1][0], drag_work_);

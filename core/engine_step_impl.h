@@ -25,6 +25,9 @@ inline constexpr const char* pass_names[pass_count] = {
 /// they live for several steps at CFL 0.25. It reaches no bit.
 inline constexpr double skin_ratio = 0.25;
 
+/// Items of a loop of few instructions below which a second thread is not worth waking.
+inline constexpr std::size_t cheap_items = 2048;
+
 inline constexpr std::size_t nobody = std::numeric_limits<std::size_t>::max();
 
 /// Throws where one of the numbers is not finite.
@@ -59,8 +62,17 @@ void Engine<D, P>::advance() {
 template <int D, class P>
 void Engine<D, P>::evaluate() {
   find_forces();
-  // Drag is a mean over the sub-steps: the grains move, and are not committed.
-  if (has_grains()) move_grains();
+  if (!has_grains()) return;
+  // Drag is a mean over the sub-steps: the grains move, and are not committed, nor is what tables
+  // and ledger say of the last step.
+  const Contacts<D, P> kept = contacts_;
+  try {
+    move_grains();
+  } catch (...) {
+    contacts_ = kept;
+    throw;
+  }
+  contacts_ = kept;
 }
 
 template <int D, class P>
@@ -98,11 +110,12 @@ void Engine<D, P>::update_lists() {
 
 template <int D, class P>
 void Engine<D, P>::find_porosity() {
-  const std::size_t n = state_.fluid.size();
-  workers_.run(n, 256, [&](std::size_t begin, std::size_t end, unsigned) {
-    for (std::size_t a = begin; a < end; ++a)
-      work_.volume_before[a] = state_.fluid.mass[a] / state_.fluid.superficial_density[a];
-  });
+  workers_.run(state_.fluid.size(), engine_detail::cheap_items,
+               [&](std::size_t begin, std::size_t end, unsigned) {
+                 for (std::size_t a = begin; a < end; ++a)
+                   work_.volume_before[a] =
+                       state_.fluid.mass[a] / state_.fluid.superficial_density[a];
+               });
   coupling_.porosity(c_, state_, work_.volume_before, work_.porosity, work_.floored_porosity,
                      workers_);
   digest_stage(Stage::porosity);
@@ -112,13 +125,14 @@ void Engine<D, P>::find_porosity() {
 
 template <int D, class P>
 void Engine<D, P>::prepare_fluid() {
-  workers_.run(state_.fluid.size(), 256, [&](std::size_t begin, std::size_t end, unsigned) {
-    for (std::size_t a = begin; a < end; ++a) {
-      const Real rhob = state_.fluid.superficial_density[a];
-      work_.volume_before[a] = state_.fluid.mass[a] / rhob;
-      work_.density_before[a] = two_way() ? rhob / work_.floored_porosity[a] : rhob;
-    }
-  });
+  workers_.run(state_.fluid.size(), engine_detail::cheap_items,
+               [&](std::size_t begin, std::size_t end, unsigned) {
+                 for (std::size_t a = begin; a < end; ++a) {
+                   const Real rhob = state_.fluid.superficial_density[a];
+                   if (!two_way()) work_.volume_before[a] = state_.fluid.mass[a] / rhob;
+                   work_.density_before[a] = two_way() ? rhob / work_.floored_porosity[a] : rhob;
+                 }
+               });
 }
 
 template <int D, class P>
@@ -231,8 +245,6 @@ void Engine<D, P>::find_grain_forces() {
 
 template <int D, class P>
 void Engine<D, P>::move_grains() {
-  next_.grains = state_.grains;
-  next_.contacts = state_.contacts;
   const std::size_t n = state_.grains.size();
   work_.outer.resize(n);
   for (std::size_t i = 0; i < n; ++i) {
@@ -243,11 +255,13 @@ void Engine<D, P>::move_grains() {
     work_.outer[i] = {weight + f.hydrodynamic, f.fluid_velocity, f.coefficient};
   }
   if (c_.frozen) {
+    next_.grains = state_.grains;
+    next_.contacts = state_.contacts;
     hold_grains();
     return;
   }
-  contacts_.advance(c_, work_.outer, walls_, scenario_.guards.overlap,
-                    state_.clock.step + 1, next_.grains, next_.contacts);
+  contacts_.advance(c_, work_.outer, walls_, scenario_.guards.overlap, state_.clock.step + 1,
+                    state_.grains, state_.contacts, next_.grains, next_.contacts, workers_);
   counters_.grain_substeps += static_cast<std::uint64_t>(c_.substeps);
   count_pass(engine_detail::pass_contacts);
   if (coupled()) {
@@ -297,32 +311,52 @@ void Engine<D, P>::wrap(Vec<Position, D>& x) const {
   }
 }
 
+/// Whether a guard stops grain i, without saying which.
+template <int D, class P>
+bool Engine<D, P>::grain_is_good(std::size_t i, double limit) const {
+  const GrainState<D, P>& grains = next_.grains;
+  double speed2 = 0, place = 0;
+  for (int k = 0; k < D; ++k) {
+    const auto v = static_cast<double>(grains.velocity[i][k]);
+    speed2 += v * v;
+    place += static_cast<double>(grains.position[i][k]);
+  }
+  if (c_.contact.rotation)
+    for (int k = 0; k < spin_components<D>; ++k) place += static_cast<double>(grains.spin[i][k]);
+  // Written so that a NaN fails too. A sum that overflows is looked at again.
+  return (speed2 <= limit * limit) & (std::abs(place) <= std::numeric_limits<double>::max());
+}
+
 template <int D, class P>
 void Engine<D, P>::check_grains() const {
   // Without fluid there is no sound speed: a grain that crosses itself within a sub-step has
   // failed.
   const double of_sound = scenario_.guards.speed * c_.sound_speed;
   const double per_diameter = static_cast<double>(c_.substeps) / c_.dt;
-  const std::uint64_t step = state_.clock.step + 1;
   for (std::size_t i = 0; i < next_.grains.size(); ++i) {
-    const GrainState<D, P>& grains = next_.grains;
-    const std::uint64_t id = grains.id[i];
-    const double limit = has_fluid()
-                             ? of_sound
-                             : c_.species[grains.species[i]].diameter * per_diameter;
-    engine_detail::require_finite<D>(grains.velocity[i], "grains.velocity", step, id);
-    if (c_.contact.rotation)
-      engine_detail::require_finite<spin_components<D>>(grains.spin[i], "grains.spin", step, id);
-    engine_detail::require_finite<D>(grains.position[i], "grains.position", step, id);
-    double speed2 = 0;
-    for (int k = 0; k < D; ++k) {
-      const auto v = static_cast<double>(grains.velocity[i][k]);
-      speed2 += v * v;
-    }
-    if (speed2 <= limit * limit) continue;
-    throw NumericalFailure("grain speed", step, "grains.velocity", id, std::sqrt(speed2), limit,
-                           "lower time.dt or contact.stiffness, or raise fluid.sound_speed");
+    const double limit =
+        has_fluid() ? of_sound : c_.species[next_.grains.species[i]].diameter * per_diameter;
+    if (!grain_is_good(i, limit)) report_grain(i, limit);
   }
+}
+
+/// Throws what a guard has to say of grain i, if any has.
+template <int D, class P>
+void Engine<D, P>::report_grain(std::size_t i, double limit) const {
+  const GrainState<D, P>& grains = next_.grains;
+  const std::uint64_t step = state_.clock.step + 1, id = grains.id[i];
+  engine_detail::require_finite<D>(grains.velocity[i], "grains.velocity", step, id);
+  if (c_.contact.rotation)
+    engine_detail::require_finite<spin_components<D>>(grains.spin[i], "grains.spin", step, id);
+  engine_detail::require_finite<D>(grains.position[i], "grains.position", step, id);
+  double speed2 = 0;
+  for (int k = 0; k < D; ++k) {
+    const auto v = static_cast<double>(grains.velocity[i][k]);
+    speed2 += v * v;
+  }
+  if (speed2 <= limit * limit) return;
+  throw NumericalFailure("grain speed", step, "grains.velocity", id, std::sqrt(speed2), limit,
+                         "lower time.dt or contact.stiffness, or raise fluid.sound_speed");
 }
 
 /// v += dt a, x += dt v for particles [begin, end); returns the first one that a guard stops.

@@ -10,7 +10,7 @@ bool FluidLists<D, Position>::stale(std::span<const Vec<Position, D>> fluid, dou
   if (listed_at_.size() != fluid.size()) return true;
   const double reach = 0.5 * skin;
   std::atomic<bool> moved_far = false;  // whether anyone did, which has no order
-  workers.run(fluid.size(), 256, [&](std::size_t begin, std::size_t end, unsigned) {
+  workers.run(fluid.size(), 2048, [&](std::size_t begin, std::size_t end, unsigned) {
     bool far = false;
     for (std::size_t i = begin; i < end; ++i) {
       double r2 = 0;
@@ -33,15 +33,19 @@ void FluidLists<D, Position>::rebuild(std::span<const Vec<Position, D>> fluid,
                                       double skin, const Periodicity<D>& period,
                                       Workers& workers) {
   const double radius = support + skin;
-  CellGrid<D, Position> fluid_cells, wall_cells;
-  fluid_cells.build(fluid, radius, period);
-  fluid_.assign(candidates<D, Position>(fluid, fluid_cells, radius, period, true, workers),
-                fluid.size(), Filler::own_index, 0);
-  wall_cells.build(walls, radius, period);
-  walls_.assign(candidates<D, Position>(fluid, wall_cells, radius, period, false, workers),
-                fluid.size(), Filler::one_past, static_cast<std::int32_t>(walls.size()));
-  wall_rows_ = candidates<D, Position>(walls, fluid_cells, radius, period, false, workers);
-  of_walls_.assign(wall_rows_, walls.size(), Filler::minus_one, 0);
+  const auto find = [&](std::span<const Vec<Position, D>> from,
+                        const CellGrid<D, Position>& cells, bool same, Rows& rows) {
+    find_candidates<D, Position>(from, cells, radius, period, same, workers, parts_, rows);
+  };
+  fluid_cells_.build(fluid, radius, period);
+  find(fluid, fluid_cells_, true, rows_);
+  fluid_.assign(rows_, fluid.size(), Filler::own_index, 0, workers);
+  wall_cells_.build(walls, radius, period);
+  find(fluid, wall_cells_, false, rows_);
+  walls_.assign(rows_, fluid.size(), Filler::one_past, static_cast<std::int32_t>(walls.size()),
+                workers);
+  find(walls, fluid_cells_, false, wall_rows_);
+  of_walls_.assign(wall_rows_, walls.size(), Filler::minus_one, 0, workers);
   listed_at_.assign(fluid.begin(), fluid.end());
 }
 

@@ -26,7 +26,9 @@ class FluidLists {
 
  private:
   GroupedStorage fluid_, walls_, of_walls_;
-  Rows wall_rows_;
+  Rows wall_rows_, rows_;
+  RowParts parts_;
+  CellGrid<D, Position> fluid_cells_, wall_cells_;  // kept for their memory
   std::vector<Vec<Position, D>> listed_at_;
 };
 

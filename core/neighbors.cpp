@@ -62,14 +62,14 @@ void CellGrid<D, Position>::build(std::span<const Vec<Position, D>> points, doub
     origin_[a] = low[a];
     inverse_cell_[a] = high[a] > low[a] ? cells[a] / (high[a] - low[a]) : 0;
   }
-  std::vector<std::uint32_t> cell_of(points.size());
+  cell_of_.resize(points.size());
   start_.assign(total + 1, 0);
   for (std::size_t i = 0; i < points.size(); ++i) {
     std::int64_t index = 0;
     for (int a = D - 1; a >= 0; --a)
       index = index * size_[a] + cell_along(static_cast<double>(points[i][a]), a);
-    cell_of[i] = static_cast<std::uint32_t>(index);
-    ++start_[cell_of[i] + 1];
+    cell_of_[i] = static_cast<std::uint32_t>(index);
+    ++start_[cell_of_[i] + 1];
   }
   for (std::size_t c = 0; c < total; ++c) start_[c + 1] += start_[c];
   fullest_ = 0;
@@ -77,9 +77,9 @@ void CellGrid<D, Position>::build(std::span<const Vec<Position, D>> points, doub
     fullest_ = std::max<std::size_t>(fullest_, start_[c + 1] - start_[c]);
   ids_.resize(points.size());
   for (auto& axis : coordinates_) axis.resize(points.size());
-  std::vector<std::uint32_t> next(start_.begin(), start_.end() - 1);
+  next_.assign(start_.begin(), start_.end() - 1);
   for (std::size_t i = 0; i < points.size(); ++i) {
-    const std::uint32_t place = next[cell_of[i]]++;
+    const std::uint32_t place = next_[cell_of_[i]]++;
     ids_[place] = static_cast<std::int32_t>(i);
     for (int a = 0; a < D; ++a) coordinates_[a][place] = static_cast<double>(points[i][a]);
   }
@@ -112,13 +112,35 @@ std::int32_t* near(const double* const* x, const std::int32_t* ids, std::uint32_
 
 }  // namespace
 
+namespace {
+
+/// Sorts different numbers. A short row is sorted by counting for each number the smaller ones,
+/// which takes no branch that could be guessed wrong.
+void sort_row(std::int32_t* first, std::int32_t* last) {
+  constexpr std::ptrdiff_t short_row = 64;
+  const std::ptrdiff_t count = last - first;
+  if (count > short_row) {
+    std::sort(first, last);
+    return;
+  }
+  std::int32_t sorted[short_row];
+  for (std::ptrdiff_t i = 0; i < count; ++i) {
+    std::int32_t smaller = 0;
+    for (std::ptrdiff_t j = 0; j < count; ++j) smaller += first[j] < first[i] ? 1 : 0;
+    sorted[smaller] = first[i];
+  }
+  std::copy_n(sorted, count, first);
+}
+
+}  // namespace
+
 template <int D, class Position>
-Rows candidates(std::span<const Vec<Position, D>> from, const CellGrid<D, Position>& grid,
-                double radius, const Periodicity<D>& period, bool same, Workers& workers) {
+void find_candidates(std::span<const Vec<Position, D>> from, const CellGrid<D, Position>& grid,
+                     double radius, const Periodicity<D>& period, bool same, Workers& workers,
+                     RowParts& parts, Rows& rows) {
   // Each thread fills its own part; the parts are joined in order, so that the result does not
   // depend on how many there are.
-  std::vector<std::vector<std::int32_t>> parts(workers.count());
-  Rows rows;
+  parts.resize(workers.count());
   rows.start.assign(from.size() + 1, 0);
   const double limit = radius * radius;
   const double* coordinates[D];
@@ -126,7 +148,8 @@ Rows candidates(std::span<const Vec<Position, D>> from, const CellGrid<D, Positi
   const auto filter = period.any() ? near<D, true> : near<D, false>;
   constexpr std::size_t cells_around = D == 2 ? 9 : 27;
   const std::size_t most = cells_around * grid.fullest_cell() + 1;
-  workers.run(from.size(), 64, [&](std::size_t begin, std::size_t end, unsigned thread) {
+  constexpr std::size_t grain = 64;
+  workers.run(from.size(), grain, [&](std::size_t begin, std::size_t end, unsigned thread) {
     std::vector<std::int32_t>& part = parts[thread];
     std::size_t used = 0;
     for (std::size_t i = begin; i < end; ++i) {
@@ -139,25 +162,32 @@ Rows candidates(std::span<const Vec<Position, D>> from, const CellGrid<D, Positi
         last = filter(coordinates, grid.ids(), from_place, to_place, point, period.length, limit,
                       last);
       });
-      std::sort(first, last);
+      sort_row(first, last);
       if (same) last = std::remove(first, last, static_cast<std::int32_t>(i));
       rows.start[i + 1] = static_cast<std::uint32_t>(last - first);
       used += static_cast<std::size_t>(last - first);
     }
-    part.resize(used);
   });
   for (std::size_t i = 0; i < from.size(); ++i) rows.start[i + 1] += rows.start[i];
-  if (parts.size() == 1) {
-    rows.index = std::move(parts[0]);
-    return rows;
-  }
-  rows.index.reserve(rows.start[from.size()]);
-  for (const auto& part : parts) rows.index.insert(rows.index.end(), part.begin(), part.end());
+  rows.index.resize(rows.start[from.size()]);
+  // Divided as before, so that each thread copies what it has found.
+  workers.run(from.size(), grain, [&](std::size_t begin, std::size_t end, unsigned thread) {
+    std::copy_n(parts[thread].begin(), rows.start[end] - rows.start[begin],
+                rows.index.begin() + rows.start[begin]);
+  });
+}
+
+template <int D, class Position>
+Rows candidates(std::span<const Vec<Position, D>> from, const CellGrid<D, Position>& grid,
+                double radius, const Periodicity<D>& period, bool same, Workers& workers) {
+  RowParts parts;
+  Rows rows;
+  find_candidates<D, Position>(from, grid, radius, period, same, workers, parts, rows);
   return rows;
 }
 
 void GroupedStorage::assign(const Rows& rows, std::size_t points, Filler filler,
-                            std::int32_t one_past) {
+                            std::int32_t one_past, Workers& workers) {
   const std::size_t groups = (points + lanes - 1) / lanes;
   start_.assign(groups + 1, 0);
   for (std::size_t g = 0; g < groups; ++g) {
@@ -167,18 +197,21 @@ void GroupedStorage::assign(const Rows& rows, std::size_t points, Filler filler,
     start_[g + 1] = start_[g] + longest;
   }
   index_.resize(static_cast<std::size_t>(start_[groups]) * lanes);
-  for (std::size_t g = 0; g < groups; ++g)
-    for (std::size_t l = 0; l < lanes; ++l) {
+  workers.run(groups, 16, [&](std::size_t begin, std::size_t end, unsigned) {
+    for (std::size_t at = begin * lanes; at < end * lanes; ++at) {
       // Lanes past the last point repeat it, as the loops do; their sums are thrown away.
-      const std::size_t i = std::min(g * lanes + l, points - 1);
+      const std::size_t g = at / lanes, i = std::min(at, points - 1);
       const std::uint32_t length = rows.start[i + 1] - rows.start[i];
+      const std::uint32_t slots = start_[g + 1] - start_[g];
       const std::int32_t fill = filler == Filler::own_index  ? static_cast<std::int32_t>(i)
                                 : filler == Filler::minus_one ? -1
                                                               : one_past;
-      for (std::uint32_t k = 0; k < start_[g + 1] - start_[g]; ++k)
-        index_[(static_cast<std::size_t>(start_[g]) + k) * lanes + l] =
-            k < length ? rows.index[rows.start[i] + k] : fill;
+      const std::int32_t* const from = rows.index.data() + rows.start[i];
+      std::int32_t* const to =
+          index_.data() + static_cast<std::size_t>(start_[g]) * lanes + at % lanes;
+      for (std::uint32_t k = 0; k < slots; ++k) to[k * lanes] = k < length ? from[k] : fill;
     }
+  });
 }
 
 template class CellGrid<2, double>;
@@ -193,5 +226,21 @@ template Rows candidates<3, double>(std::span<const Vec<double, 3>>, const CellG
                                     double, const Periodicity<3>&, bool, Workers&);
 template Rows candidates<3, float>(std::span<const Vec<float, 3>>, const CellGrid<3, float>&,
                                    double, const Periodicity<3>&, bool, Workers&);
+template void find_candidates<2, double>(std::span<const Vec<double, 2>>,
+                                         const CellGrid<2, double>&, double,
+                                         const Periodicity<2>&, bool, Workers&, RowParts&,
+                                         Rows&);
+template void find_candidates<2, float>(std::span<const Vec<float, 2>>,
+                                         const CellGrid<2, float>&, double,
+                                         const Periodicity<2>&, bool, Workers&, RowParts&,
+                                         Rows&);
+template void find_candidates<3, double>(std::span<const Vec<double, 3>>,
+                                         const CellGrid<3, double>&, double,
+                                         const Periodicity<3>&, bool, Workers&, RowParts&,
+                                         Rows&);
+template void find_candidates<3, float>(std::span<const Vec<float, 3>>,
+                                         const CellGrid<3, float>&, double,
+                                         const Periodicity<3>&, bool, Workers&, RowParts&,
+                                         Rows&);
 
 }  // namespace varve::core

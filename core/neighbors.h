@@ -54,6 +54,7 @@ class CellGrid {
   std::vector<std::uint32_t> start_;
   std::vector<double> coordinates_[D];
   std::vector<std::int32_t> ids_;
+  std::vector<std::uint32_t> cell_of_, next_;  // while building
 };
 
 /// Candidates per point, compressed rows: of point i they are index[start[i] .. start[i+1]).
@@ -72,6 +73,14 @@ template <int D, class Position>
 Rows candidates(std::span<const Vec<Position, D>> from, const CellGrid<D, Position>& grid,
                 double radius, const Periodicity<D>& period, bool same, Workers& workers);
 
+/// What each thread has found, kept from one search to the next for its memory.
+using RowParts = std::vector<std::vector<std::int32_t>>;
+/// The same into rows that may hold memory already.
+template <int D, class Position>
+void find_candidates(std::span<const Vec<Position, D>> from, const CellGrid<D, Position>& grid,
+                     double radius, const Periodicity<D>& period, bool same, Workers& workers,
+                     RowParts& parts, Rows& rows);
+
 /// What short lanes are filled with.
 enum class Filler { own_index, minus_one, one_past };
 
@@ -79,7 +88,8 @@ enum class Filler { own_index, minus_one, one_past };
 class GroupedStorage {
  public:
   /// `one_past` is the index used by Filler::one_past.
-  void assign(const Rows& rows, std::size_t points, Filler filler, std::int32_t one_past);
+  void assign(const Rows& rows, std::size_t points, Filler filler, std::int32_t one_past,
+              Workers& workers);
   GroupedLists view() const { return {start_.data(), index_.data()}; }
 
  private:
@@ -93,8 +103,8 @@ template <int D, class Position>
 template <class Visit>
 void CellGrid<D, Position>::around(const Vec<Position, D>& point, Visit&& visit) const {
   // Along a periodic axis of one or two cells the neighbours repeat; each is visited once.
-  std::int64_t cells[D][3] = {};
-  int counts[D] = {};
+  std::int64_t cells[3][3] = {};
+  int counts[3] = {};
   for (int a = 0; a < D; ++a) {
     const std::int64_t middle = cell_along(static_cast<double>(point[a]), a);
     counts[a] = 0;
@@ -109,19 +119,25 @@ void CellGrid<D, Position>::around(const Vec<Position, D>& point, Visit&& visit)
       if (!repeated) cells[a][counts[a]++] = c;
     }
   }
-  const int planes = D == 3 ? counts[D - 1] : 1;
+  const int planes = D == 3 ? counts[2] : 1;
   for (int z = 0; z < planes; ++z)
     for (int y = 0; y < counts[1]; ++y) {
       std::int64_t row = cells[1][y] * size_[0];
       if constexpr (D == 3) row += cells[2][z] * size_[0] * size_[1];
-      // Cells side by side in a row are one stretch.
-      for (int x = 0; x < counts[0];) {
-        int last = x;
-        while (last + 1 < counts[0] && cells[0][last + 1] == cells[0][last] + 1) ++last;
-        visit(start_[static_cast<std::size_t>(row + cells[0][x])],
-              start_[static_cast<std::size_t>(row + cells[0][last] + 1)]);
-        x = last + 1;
+      // Cells side by side in a row are one stretch; there is at least the middle one.
+      std::int64_t from = cells[0][0], to = from;
+      const auto stretch = [&] {
+        visit(start_[static_cast<std::size_t>(row + from)],
+              start_[static_cast<std::size_t>(row + to)]);
+      };
+      for (int x = 0; x < counts[0]; ++x) {
+        if (cells[0][x] != to) {
+          stretch();
+          from = to = cells[0][x];
+        }
+        ++to;
       }
+      stretch();
     }
 }
 

@@ -11,11 +11,9 @@ Workers::Workers(unsigned count)
 }
 
 Workers::~Workers() {
-  {
-    const std::lock_guard lock(mutex_);
-    stopping_ = true;
-  }
-  start_.notify_all();
+  stopping_ = true;
+  generation_.fetch_add(1, std::memory_order_release);
+  generation_.notify_all();
   for (std::thread& thread : threads_) thread.join();
 }
 
@@ -40,18 +38,12 @@ void Workers::execute(const Task& task) {
     task.call(task.context, 0, task.items, 0);
     return;
   }
-  {
-    const std::lock_guard lock(mutex_);
-    task_ = task;
-    running_ = static_cast<unsigned>(threads_.size());
-    ++generation_;
-  }
-  start_.notify_all();
+  task_ = task;
+  running_.store(static_cast<std::uint32_t>(threads_.size()), std::memory_order_relaxed);
+  generation_.fetch_add(1, std::memory_order_release);
+  generation_.notify_all();
   work_on(task, 0);
-  {
-    std::unique_lock lock(mutex_);
-    finish_.wait(lock, [this] { return running_ == 0; });
-  }
+  while (const std::uint32_t left = running_.load(std::memory_order_acquire)) running_.wait(left);
   for (std::exception_ptr& failure : failures_)
     if (failure) {
       const std::exception_ptr first = failure;
@@ -61,21 +53,14 @@ void Workers::execute(const Task& task) {
 }
 
 void Workers::serve(unsigned thread) {
-  std::uint64_t seen = 0;
+  std::uint32_t seen = 0;
   while (true) {
-    Task task;
-    {
-      std::unique_lock lock(mutex_);
-      start_.wait(lock, [&] { return stopping_ || generation_ != seen; });
-      if (stopping_) return;
-      seen = generation_;
-      task = task_;
-    }
-    work_on(task, thread);
-    {
-      const std::lock_guard lock(mutex_);
-      if (--running_ == 0) finish_.notify_one();
-    }
+    generation_.wait(seen, std::memory_order_acquire);
+    if (stopping_) return;
+    // The next one starts only when this thread, too, is done: none is missed.
+    ++seen;
+    work_on(task_, thread);
+    if (running_.fetch_sub(1, std::memory_order_acq_rel) == 1) running_.notify_one();
   }
 }
 

@@ -3,11 +3,10 @@
 // threads.
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <exception>
-#include <condition_variable>
-#include <mutex>
 #include <thread>
 #include <type_traits>
 #include <vector>
@@ -52,11 +51,10 @@ class Workers {
   std::vector<std::thread> threads_;
   std::vector<std::uint64_t> done_;
   std::vector<std::exception_ptr> failures_;
-  std::mutex mutex_;
-  std::condition_variable start_, finish_;
   Task task_;
-  std::uint64_t generation_ = 0;
-  unsigned running_ = 0;
+  // A thread waits for the first to change, the caller for the second to become 0, both asleep in
+  // the kernel.
+  std::atomic<std::uint32_t> generation_ = 0, running_ = 0;
   bool stopping_ = false;
 };
 

@@ -1,7 +1,8 @@
-// How fast the engine is and what recording costs, in CPU time of the threads concerned, so that a
-// busy machine disturbs little. Configurations take turns within every round: a machine that slows
-// down meanwhile slows all of them.
-//   throughput [--rounds N] [--seconds S] [--scene NAME]
+// How fast the engine is, for every instruction set, one thread and two, every precision, and while
+// recording: particle updates per second of CPU (all engine threads together) and of time, and what
+// the log's writer takes. All variants of a scene advance in turns, so that whatever else the
+// machine does strikes them alike.
+//   throughput [--rounds N] [--seconds S] [--scene NAME] [--variant NAME] [--threads N]
 #include <time.h>
 #include <unistd.h>
 
@@ -28,41 +29,49 @@ using namespace varve;
 
 struct Options {
   unsigned rounds = 5;
-  double seconds = 1.0;  // of engine CPU time per configuration and round
-  std::string scene;
+  double seconds = 0.5;  // of engine CPU time per variant and round
+  std::string scene, variant;
+  unsigned threads = 0;  // 0: one and two
 };
 
 struct Scene {
   std::string name;
-  double width, height;
+  double width, height;  // [m]
   std::int64_t rows, columns;
   double level = 0;  // [m] of fluid under a free surface; 0: a full closed box
+  double depth = 0;  // [m] of a 3D scene
 };
 
-struct Configuration {
-  std::string name;
-  int instruction_set;
-  bool record;
-};
-
-/// CPU times of one measurement, and what was done in them.
+/// One turn's times, and what was done in them.
 struct Sample {
-  double engine_s = 0;  // engine's thread, recording left out
-  double append_s = 0;  // engine's thread, handing frames to the log
-  double writer_s = 0;  // writer's thread
-  double particle_steps = 0;
-  std::uint64_t log_bytes = 0, steps = 0;
+  double cpu_s = 0, wall_s = 0;  // of all engine threads; from start to end
+  double append_s = 0;           // engine's thread, handing frames to the log
+  double writer_s = 0;           // writer's thread
+  double updates = 0;
+  std::uint64_t log_bytes = 0;
 };
 
-double thread_cpu_s() {
+struct Variant {
+  std::string name;
+  core::Precision precision;
+  int instruction_set;
+  unsigned threads;
+  bool record = false;
+  std::unique_ptr<tools::SimulationEngine> engine = nullptr;
+  std::unique_ptr<io::LogWriter> writer = nullptr;
+  std::vector<Sample> samples = {};
+};
+
+double seconds_of(clockid_t clock) {
   timespec now{};
-  if (clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now) != 0) throw std::runtime_error("no CPU clock");
+  if (clock_gettime(clock, &now) != 0) throw std::runtime_error("a clock does not answer");
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
 /// The study's collective set in a box of the given size, or a tank of fluid alone.
-core::Scenario scenario_of(const Scene& scene) {
+core::Scenario scenario_of(const Scene& scene, core::Precision precision) {
   core::Scenario scenario;
+  scenario.precision = precision;
   scenario.domain.width = scene.width;
   scenario.domain.height = scene.height;
   scenario.fluid.sound_speed = 2.5;
@@ -72,10 +81,15 @@ core::Scenario scenario_of(const Scene& scene) {
     scenario.fluid.jitter = 0.05;
     scenario.fluid.sound_speed = 10 * 1.0849;  // 10 sqrt(2 g H) for H = 6 cm
   }
+  if (scene.depth > 0) {
+    scenario.domain.dimension = 3;
+    scenario.domain.depth = scene.depth;
+  }
   scenario.grains.rows = scene.rows;
   scenario.grains.columns = scene.columns;
   scenario.grains.density = 2000;
   scenario.grains.gap = 0.1;
+  // In a box without grains the fluid would stay at rest and its lists never be made again.
   scenario.grains.lowest_y = scene.rows > 1 ? 0.07 : 0.04;
   scenario.time.until = 10;
   const auto problems = core::resolve(scenario);
@@ -83,80 +97,101 @@ core::Scenario scenario_of(const Scene& scene) {
   return scenario;
 }
 
+std::vector<Variant> variants(const Options& options) {
+  const int widest = static_cast<int>(core::best_instruction_set());
+  const std::string name{core::name_of(core::best_instruction_set())};
+  std::vector<Variant> all;
+  const auto add = [&](Variant variant) {
+    if (!options.variant.empty() && options.variant != variant.name) return;
+    if (options.threads != 0 && options.threads != variant.threads) return;
+    all.push_back(std::move(variant));
+  };
+  for (int set = 0; set <= widest; ++set)
+    for (const unsigned threads : {1u, 2u})
+      add({set == widest ? "widest" : std::string(core::name_of(core::InstructionSet(set))),
+           core::Precision::double_, set, threads});
+  add({"mixed", core::Precision::mixed, widest, 1});
+  add({"float", core::Precision::float_, widest, 1});
+  add({"recording", core::Precision::double_, widest, 1, true});
+  if (all.empty()) throw std::runtime_error(options.variant + ": no such variant");
+  return all;
+}
+
 double particles_of(const io::Schema& schema, const io::FrameView& frame) {
   double particles = 0;
-  for (std::size_t index = 0; index < schema.fields.size(); ++index) {
-    if (schema.fields[index].is_id) particles += static_cast<double>(frame.fields[index].count);
-  }
+  for (std::size_t k = 0; k < schema.fields.size(); ++k)
+    if (schema.fields[k].is_id && schema.fields[k].name != "contacts.key")
+      particles += static_cast<double>(frame.fields[k].count);
   return particles;
 }
 
-Sample measure(const Scene& scene, const Configuration& configuration, double seconds,
-               const std::string& log_path) {
-  const core::Scenario scenario = scenario_of(scene);
-  const auto engine = tools::SimulationEngine::fresh(
-      scenario, {.threads = 1, .instruction_set = configuration.instruction_set});
-  std::unique_ptr<io::LogWriter> writer;
-  if (configuration.record) {
+void prepare(Variant& variant, const Scene& scene, const std::string& log_path) {
+  const core::Scenario scenario = scenario_of(scene, variant.precision);
+  variant.engine = tools::SimulationEngine::fresh(
+      scenario, {.threads = variant.threads, .instruction_set = variant.instruction_set});
+  if (variant.record) {
     io::WriterOptions options;
     options.overwrite = true;
-    writer = io::LogWriter::create(log_path, tools::make_genesis(scenario, engine->schema(), 1),
-                                   engine->frame(), engine->events(), options);
+    variant.writer = io::LogWriter::create(
+        log_path, tools::make_genesis(scenario, variant.engine->schema(), 1),
+        variant.engine->frame(), variant.engine->events(), options);
   }
   for (int step = 0; step < 20; ++step) {  // caches, lists and the codec's order settle first
-    engine->advance();
-    if (writer) writer->append(engine->frame(), engine->events());
+    variant.engine->advance();
+    if (variant.writer) variant.writer->append(variant.engine->frame(), variant.engine->events());
   }
-  if (writer) writer->flush();
+  if (variant.writer) variant.writer->flush();
+}
+
+/// Advances one variant by `seconds` of CPU.
+void take_turn(Variant& variant, double seconds) {
+  io::LogWriter* const writer = variant.writer.get();
   const io::WriterStatus before = writer ? writer->status() : io::WriterStatus{};
+  const double cpu = seconds_of(CLOCK_PROCESS_CPUTIME_ID), wall = seconds_of(CLOCK_MONOTONIC);
   Sample sample;
-  while (sample.engine_s < seconds) {
-    const double start = thread_cpu_s();
-    engine->advance();
-    const double advanced = thread_cpu_s();
-    if (writer) writer->append(engine->frame(), engine->events());
-    sample.append_s += thread_cpu_s() - advanced;
-    sample.engine_s += advanced - start;
-    sample.particle_steps += particles_of(engine->schema(), engine->frame());
-    ++sample.steps;
+  while (sample.cpu_s < seconds) {
+    variant.engine->advance();
+    if (writer) {
+      const double start = seconds_of(CLOCK_THREAD_CPUTIME_ID);
+      writer->append(variant.engine->frame(), variant.engine->events());
+      sample.append_s += seconds_of(CLOCK_THREAD_CPUTIME_ID) - start;
+    }
+    sample.updates += particles_of(variant.engine->schema(), variant.engine->frame());
+    sample.cpu_s = seconds_of(CLOCK_PROCESS_CPUTIME_ID) - cpu;
   }
   if (writer) {
     writer->flush();
     const io::WriterStatus after = writer->status();
     sample.writer_s = after.writer_cpu_s - before.writer_cpu_s;
     sample.log_bytes = after.bytes - before.bytes;
-    writer->close();
+    sample.cpu_s = seconds_of(CLOCK_PROCESS_CPUTIME_ID) - cpu - sample.writer_s;
   }
-  return sample;
+  sample.wall_s = seconds_of(CLOCK_MONOTONIC) - wall;
+  variant.samples.push_back(sample);
 }
 
-struct Spread {
-  double least, middle, most;
-};
-Spread spread_of(const std::vector<Sample>& samples, double (*figure)(const Sample&)) {
+std::string spread_of(const std::vector<Sample>& samples, double (*figure)(const Sample&)) {
   std::vector<double> values;
   for (const Sample& sample : samples) values.push_back(figure(sample));
   std::sort(values.begin(), values.end());
-  return {values.front(), values[values.size() / 2], values.back()};
+  return fmt::format("{:.2f} ({:.2f}-{:.2f})", values[values.size() / 2], values.front(),
+                     values.back());
 }
 
-void print(const Scene& scene, const Configuration& configuration,
-           const std::vector<Sample>& samples) {
-  const Spread rate = spread_of(
-      samples, [](const Sample& s) { return 1e-6 * s.particle_steps / (s.engine_s + s.append_s); });
-  fmt::print("{:<10} {:<20} {:6.2f} ({:.2f}-{:.2f})", scene.name, configuration.name, rate.middle,
-             rate.least, rate.most);
-  if (configuration.record) {
-    const Spread append =
-        spread_of(samples, [](const Sample& s) { return 1e9 * s.append_s / s.particle_steps; });
-    const Spread writer =
-        spread_of(samples, [](const Sample& s) { return 1e9 * s.writer_s / s.particle_steps; });
-    const Spread bytes = spread_of(samples, [](const Sample& s) {
-      return static_cast<double>(s.log_bytes) / s.particle_steps;
-    });
-    fmt::print("   {:6.2f} ({:.2f}-{:.2f})   {:6.1f} ({:.1f}-{:.1f})   {:6.2f}", append.middle,
-               append.least, append.most, writer.middle, writer.least, writer.most, bytes.middle);
-  }
+void print(const Scene& scene, const Variant& variant) {
+  const auto spread = [&](double (*figure)(const Sample&)) {
+    return spread_of(variant.samples, figure);
+  };
+  fmt::print("{:<10} {:<10} {:>7}   {:<20} {:<20}", scene.name, variant.name, variant.threads,
+             spread([](const Sample& s) { return 1e-6 * s.updates / s.cpu_s; }),
+             spread([](const Sample& s) { return 1e-6 * s.updates / s.wall_s; }));
+  if (variant.record)
+    fmt::print(" {:<20} {:<20} {}",
+               spread([](const Sample& s) { return 1e9 * s.append_s / s.updates; }),
+               spread([](const Sample& s) { return 1e9 * s.writer_s / s.updates; }),
+               spread([](const Sample& s) {
+                 return static_cast<double>(s.log_bytes) / s.updates;
+               }));
   fmt::print("\n");
 }
 
@@ -177,43 +212,44 @@ Options parse(int argc, char** argv) {
     if (name == "--rounds") options.rounds = static_cast<unsigned>(std::stoul(value));
     else if (name == "--seconds") options.seconds = std::stod(value);
     else if (name == "--scene") options.scene = value;
-    else throw std::runtime_error(name + ": unknown; --rounds N --seconds S --scene NAME");
+    else if (name == "--variant") options.variant = value;
+    else if (name == "--threads") options.threads = static_cast<unsigned>(std::stoul(value));
+    else throw std::runtime_error(
+        name + ": unknown; --rounds N --seconds S --scene NAME --variant NAME --threads N");
   }
   if (options.rounds == 0) throw std::runtime_error("--rounds: at least 1");
   return options;
 }
 
 int throughput(const Options& options) {
+  // The tanks are there for comparison with another code (tests/bench/against_pysph).
   const std::vector<Scene> scenes = {{"1200+1", 0.02, 0.06, 1, 1},
                                      {"7200+32", 0.06, 0.12, 4, 8},
                                      {"24000+32", 0.20, 0.12, 4, 8},
-                                     {"tank", 0.12, 0.09, 0, 0, 0.06}};
-  const std::string widest{core::name_of(core::best_instruction_set())};
-  const std::vector<Configuration> configurations = {{"baseline, off", 0, false},
-                                                     {widest + ", off", -1, false},
-                                                     {widest + ", recording", -1, true}};
+                                     {"tank", 0.12, 0.09, 0, 0, 0.06},
+                                     {"tank3d", 0.024, 0.036, 0, 0, 0.024, 0.024}};
   const auto folder = std::filesystem::temp_directory_path() /
                       fmt::format("varve-throughput-{}", getpid());
   std::filesystem::create_directory(folder);
-  fmt::print("{}; one engine thread; median (least-most) of {} rounds of {} s of engine CPU time\n",
+  fmt::print("{}; 10^6 particle updates per second, median (least-most) of {} rounds of {} s\n",
              processor(), options.rounds, options.seconds);
-  fmt::print("{:<10} {:<20} {:<22} {:<22} {:<22} {}\n", "particles", "configuration",
-             "10^6 updates/CPU-s", "append ns/part.-step", "writer ns/part.-step", "B/part.-step");
+  fmt::print("{:<10} {:<10} {:>7}   {:<20} {:<20} {:<20} {:<20} {}\n", "particles", "variant",
+             "threads", "of CPU", "of time", "append ns/update", "writer ns/update", "B/update");
+  bool found = false;
   for (const Scene& scene : scenes) {
-    // The tank is there for comparison with another code (tests/bench/against_pysph).
     if (options.scene.empty() ? scene.level > 0 : options.scene != scene.name) continue;
-    std::vector<std::vector<Sample>> samples(configurations.size());
-    for (unsigned round = 0; round < options.rounds; ++round) {
-      for (std::size_t index = 0; index < configurations.size(); ++index) {
-        samples[index].push_back(measure(scene, configurations[index], options.seconds,
-                                         (folder / "bench.varve").string()));
-      }
-    }
-    for (std::size_t index = 0; index < configurations.size(); ++index) {
-      print(scene, configurations[index], samples[index]);
+    found = true;
+    std::vector<Variant> all = variants(options);
+    for (Variant& variant : all) prepare(variant, scene, (folder / "bench.varve").string());
+    for (unsigned round = 0; round < options.rounds; ++round)
+      for (Variant& variant : all) take_turn(variant, options.seconds);
+    for (const Variant& variant : all) {
+      print(scene, variant);
+      if (variant.writer) variant.writer->close();
     }
   }
   std::filesystem::remove_all(folder);
+  if (!found) throw std::runtime_error(options.scene + ": no such scene");
   return 0;
 }
 

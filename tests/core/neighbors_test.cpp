@@ -213,7 +213,8 @@ TEST(GroupedStorage, HoldsTheRowsInterleavedAndFillsShortLanes) {
   }
   for (const Filler filler : {Filler::own_index, Filler::minus_one, Filler::one_past}) {
     GroupedStorage storage;
-    storage.assign(rows, 10, filler, 777);
+    Workers workers(2);
+    storage.assign(rows, 10, filler, 777, workers);
     const GroupedLists view = storage.view();
     EXPECT_EQ(view.start[0], 0u);
     EXPECT_EQ(view.start[1], 4u);
