@@ -105,6 +105,12 @@ class CouplingStage {
   /// forces on fluid is not matched by one on a grain.
   Vec<double, D> walls_on_fluid() const;
 
+  /// Fluid particles that grain `i` has weights with, and those weights w_ai.
+  std::span<const std::int32_t> fluid_of(std::size_t i) const { return fluid_of_.of(i); }
+  std::span<const double> weights_of(std::size_t i) const {
+    return std::span(weights_).subspan(fluid_of_.start[i], fluid_of_.of(i).size());
+  }
+
   const std::vector<GrainForce<D>>& grain_forces() const { return forces_; }
   std::uint64_t fluid_clamps() const { return fluid_clamps_; }
   std::uint64_t grain_clamps() const { return grain_clamps_; }

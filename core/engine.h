@@ -43,6 +43,7 @@ class Engine final : public Simulation {
   const std::vector<Happening>& happenings() const override { return happenings_; }
   const Counters& counters() const override;
   StepLedger ledger() const override;
+  StepBalance balance() const override;
   std::vector<GrainReport> grain_reports() const override;
   FluidReport fluid_report() const override;
 
@@ -113,7 +114,28 @@ class Engine final : public Simulation {
   double beyond_walls(const Vec<Position, D>& x) const;
   static void describe(const GeometryReport& report, std::vector<Happening>& happenings);
   static ChangeOptions scheduled_options(const ScheduledChange& scheduled);
-  Vec<double, D> walls_on_fluid() const;
+  Vec<double, D> walls_on_fluid(const FluidState<D, P>& at) const;
+  StepLedger ledger_of(const FluidState<D, P>& at, const Vec<double, D>& fluid_change,
+                       const Vec<double, D>& grain_change) const;
+  std::vector<Vec<double, D>> velocities_ahead() const;
+  double internal_energy(double density) const;
+  template <class SmoothingKernel>
+  double late_work(const SmoothingKernel& kernel, const Vec<double, D>& d,
+                   const Vec<double, D>& v) const;
+  template <class SmoothingKernel>
+  void balance_pairs(const SmoothingKernel& kernel, const std::vector<Vec<double, D>>& mean,
+                     std::vector<Vec<double, D>>& viscous, std::vector<double>& diffused,
+                     StepBalance& sum) const;
+  template <class SmoothingKernel>
+  void balance_walls(const SmoothingKernel& kernel, const std::vector<Vec<double, D>>& mean,
+                     std::vector<Vec<double, D>>& viscous, StepBalance& sum) const;
+  void balance_fluid(std::vector<Vec<double, D>>& mean, std::vector<Vec<double, D>>& viscous,
+                     std::vector<double>& diffused, StepBalance& sum) const;
+  void balance_grains(const std::vector<Vec<double, D>>& mean,
+                      const std::vector<Vec<double, D>>& viscous,
+                      const std::vector<double>& diffused, StepBalance& sum) const;
+  double contact_elastic() const;
+  Vec<double, D> apart(const Vec<Position, D>& a, const Vec<Position, D>& b) const;
   bool has_fluid() const { return with_fluid && scenario_.has_fluid(); }
   bool has_grains() const { return with_grains && scenario_.has_grains(); }
   bool coupled() const { return with_fluid && with_grains && c_.coupled; }

@@ -9,6 +9,7 @@
 
 #include "core/engine_step_impl.h"
 
+#include "core/engine_balance_impl.h"
 #include "core/engine_change_impl.h"
 #include "core/engine_fields_impl.h"
 #include "core/engine_report_impl.h"

@@ -67,9 +67,9 @@ void Engine<D, P>::describe(const GeometryReport& report, std::vector<Happening>
 }
 
 /// Force on the dummies' side: the sum over dummies of minus what each does to the fluid near it,
-/// with the positions, pressures and velocities of the last step's force evaluation.
+/// with the pressures and velocities of the last force evaluation, which was of the state `at`.
 template <int D, class P>
-Vec<double, D> Engine<D, P>::walls_on_fluid() const {
+Vec<double, D> Engine<D, P>::walls_on_fluid(const FluidState<D, P>& at) const {
   Vec<double, D> total = Vec<double, D>::Zero();
   const double h = c_.smoothing_length, soft = 0.01 * h * h;
   for (std::size_t w = 0; w < work_.wall_count; ++w)
@@ -78,8 +78,7 @@ Vec<double, D> Engine<D, P>::walls_on_fluid() const {
       Vec<double, D> d;
       double r2 = 0;
       for (int k = 0; k < D; ++k) {
-        // next_ holds the state in which the forces were evaluated.
-        d[k] = static_cast<double>(next_.fluid.position[a][k]) -
+        d[k] = static_cast<double>(at.position[a][k]) -
                static_cast<double>(work_.wall_position[w][k]);
         const double length = c_.period.length[k];
         if (d[k] > 0.5 * length) d[k] -= length;
@@ -94,7 +93,7 @@ Vec<double, D> Engine<D, P>::walls_on_fluid() const {
       const double pressures = static_cast<double>(work_.push[a]) +
                                static_cast<double>(work_.wall_push[w]);
       for (int k = 0; k < D; ++k) {
-        const double dv = static_cast<double>(next_.fluid.velocity[a][k]) -
+        const double dv = static_cast<double>(at.velocity[a][k]) -
                           static_cast<double>(work_.wall_velocity[w][k]);
         total[k] += -pressures * volumes * slope * d[k] +
                     2 * c_.viscosity * viscous * slope * (r2 / (r2 + soft)) * dv;
@@ -102,21 +101,38 @@ Vec<double, D> Engine<D, P>::walls_on_fluid() const {
     }
   if (c_.conjugate_pressure) total += coupling_.walls_on_fluid();
   for (std::size_t a = 0; a < state_.fluid.size(); ++a)
-    total += static_cast<double>(state_.fluid.mass[a]) * wall_repulsion(next_.fluid.position[a]);
+    total += static_cast<double>(state_.fluid.mass[a]) * wall_repulsion(at.position[a]);
   return total;
 }
 
 template <int D, class P>
 StepLedger Engine<D, P>::ledger() const {
   using V = Vec<double, D>;
-  V fluid_change = V::Zero(), fluid_external = V::Zero(), reactions = V::Zero();
-  V grain_change = V::Zero(), grain_external = V::Zero(), from_fluid = V::Zero();
+  // next_ holds the state in which the forces were evaluated.
+  V fluid_change = V::Zero(), grain_change = V::Zero();
+  for (std::size_t a = 0; a < state_.fluid.size(); ++a) {
+    const V dv = state_.fluid.velocity[a].template cast<double>() -
+                 next_.fluid.velocity[a].template cast<double>();
+    fluid_change += static_cast<double>(state_.fluid.mass[a]) * dv;
+  }
+  for (std::size_t i = 0; i < state_.grains.size(); ++i) {
+    const V dv = state_.grains.velocity[i].template cast<double>() -
+                 next_.grains.velocity[i].template cast<double>();
+    grain_change += c_.species[state_.grains.species[i]].mass * dv;
+  }
+  return ledger_of(next_.fluid, fluid_change, grain_change);
+}
+
+/// The sums of a step whose forces were evaluated at `at`, with the changes of momentum given.
+template <int D, class P>
+StepLedger Engine<D, P>::ledger_of(const FluidState<D, P>& at, const Vec<double, D>& fluid_change,
+                                   const Vec<double, D>& grain_change) const {
+  using V = Vec<double, D>;
+  V fluid_external = V::Zero(), reactions = V::Zero();
+  V grain_external = V::Zero(), from_fluid = V::Zero();
   double scale = 0;
   for (std::size_t a = 0; a < state_.fluid.size(); ++a) {
     const auto m = static_cast<double>(state_.fluid.mass[a]);
-    const V dv = state_.fluid.velocity[a].template cast<double>() -
-                 next_.fluid.velocity[a].template cast<double>();
-    fluid_change += m * dv;
     fluid_external += m * c_.fluid_acceleration;
     const V reaction = c_.two_way ? coupling_.reaction(a, static_cast<double>(work_.volume[a]))
                                   : V(V::Zero());
@@ -125,10 +141,7 @@ StepLedger Engine<D, P>::ledger() const {
     scale += stress.norm() + reaction.norm() + m * c_.fluid_acceleration.norm();
   }
   for (std::size_t i = 0; i < state_.grains.size(); ++i) {
-    const V dv = state_.grains.velocity[i].template cast<double>() -
-                 next_.grains.velocity[i].template cast<double>();
     const SpeciesConstants<D>& one = c_.species[state_.grains.species[i]];
-    grain_change += one.mass * dv;
     V acting = V::Zero();
     if (c_.coupled) {
       const GrainForce<D>& f = coupling_.grain_forces()[i];
@@ -144,7 +157,7 @@ StepLedger Engine<D, P>::ledger() const {
   V on_grains = V::Zero();
   if (scenario_.has_grains() && !c_.frozen) on_grains = contacts_.wall_impulse() / c_.dt;
   using engine_detail::listed;
-  return {listed<D>(fluid_change),   listed<D>(grain_change),   listed<D>(walls_on_fluid()),
+  return {listed<D>(fluid_change),   listed<D>(grain_change),   listed<D>(walls_on_fluid(at)),
           listed<D>(on_grains),      listed<D>(fluid_external), listed<D>(grain_external),
           listed<D>(from_fluid),     listed<D>(reactions),      scale + on_grains.norm()};
 }

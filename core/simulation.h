@@ -120,6 +120,34 @@ struct StepLedger {
   double force_scale = 0;                     ///< sum of |F| over all particles
 };
 
+/// Momentum and energy of the step that starts at an evaluated state, as advance() would take it.
+/// Energies in J, powers in W (per m depth in 2D), means over the step; a loss is positive. Works
+/// are forces times the mean of the velocities before and after, so that those on the fluid add up
+/// to what its kinetic energy changes by. core/engine_balance_impl.h has the terms.
+struct StepBalance {
+  StepLedger ledger;
+  double fluid_kinetic = 0;       ///< at the state
+  double compression = 0;         ///< of the fluid at the state: sum m u(rho), du = p drho / rho^2
+  double contact_elastic = 0;     ///< in the springs of contacts at the state
+  double fluid_gain = 0;          ///< kinetic power of all forces on the fluid
+  double viscous_loss = 0;        ///< shear among the fluid
+  double wall_viscous_loss = 0;   ///< shear between fluid and walls
+  double artificial_loss = 0;     ///< artificial viscosity
+  double diffusion_loss = 0;      ///< density diffusion, of the compression energy
+  double drag_loss = 0;           ///< drag, between grains and the fluid around them
+  double shear_loss = 0;          ///< viscous part of the hydrodynamic force, likewise
+  double external_on_fluid = 0;   ///< work of gravity (full form) and body force
+  double walls_on_fluid = 0;      ///< work of walls that move, and of what holds fluid inside
+  double wall_pressure = 0;       ///< work of the dummies' own pressure, which continuity lacks
+  double step_pressure = 0;       ///< work of the pressure that the length of a step adds
+  double on_grains = 0;           ///< work of drag and hydrodynamic force on the grains
+  std::vector<double> shear_on_grains;  ///< [N] D per grain: viscous part of the hydrodynamic force
+  /// Per grain, with the porosity of E3 (empty otherwise): V_j p_j [J], S_j, and what density
+  /// diffusion adds to S_j in the step. E3 takes S_j for 1; what that makes of the pressure's work
+  /// is V_j p_j dS_j, dS_j without the part of diffusion.
+  std::vector<double> pressure_volume, shepard_sum, shepard_diffusion;
+};
+
 /// What acted on one grain in the last step [N], [m/s], [-].
 struct GrainReport {
   std::vector<double> hydrodynamic, drag, fluid_velocity;
@@ -173,6 +201,9 @@ class Simulation {
 
   /// Sums over the last step, each by a pass of its own; meaningful after advance().
   virtual StepLedger ledger() const = 0;
+  /// The same and the energies, of the step that advance() would take; meaningful after
+  /// evaluate().
+  virtual StepBalance balance() const = 0;
   /// Forces on each grain in the last step; empty without coupling.
   virtual std::vector<GrainReport> grain_reports() const = 0;
   /// Pressures and porosities of the fluid in the last step.

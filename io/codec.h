@@ -59,6 +59,12 @@ class FrameDecoder {
   /// keyframe is accepted.
   virtual const Frame& decode(std::span<const EncodedField> fields, bool keyframe,
                               std::uint64_t step, double time, double dt) = 0;
+  /// The same for some populations: `wanted` has an entry per field, alike over a population. Other
+  /// fields need no payload and come out empty; deltas of theirs are refused until a keyframe in
+  /// which they are wanted again.
+  virtual const Frame& decode(std::span<const EncodedField> fields,
+                              const std::vector<bool>& wanted, bool keyframe, std::uint64_t step,
+                              double time, double dt) = 0;
 };
 
 }  // namespace varve::io

@@ -32,13 +32,19 @@ class Decoder final : public FrameDecoder {
     for (const TableDescriptor& table : schema.tables) {
       frame_.tables.emplace_back(table.columns.size());
     }
+    followed_.assign(layout_.populations.size(), false);
   }
 
   const Frame& decode(std::span<const EncodedField> fields, bool keyframe, std::uint64_t step,
                       double time, double dt) override {
+    return decode(fields, std::vector<bool>(schema_.fields.size(), true), keyframe, step, time, dt);
+  }
+
+  const Frame& decode(std::span<const EncodedField> fields, const std::vector<bool>& wanted,
+                      bool keyframe, std::uint64_t step, double time, double dt) override {
     const bool history = whole_;
     whole_ = false;  // a record that fails half-way leaves no history to build on
-    check(fields, keyframe, history);
+    check(fields, wanted, keyframe, history);
     const DefaultFloatMode mode;
     if (keyframe) {
       times_.clear();
@@ -47,8 +53,19 @@ class Decoder final : public FrameDecoder {
     frame_.step = step;
     frame_.time = time;
     frame_.dt = dt;
-    for (const PopulationPlan& population : layout_.populations) {
-      decode_population(population, fields, dt);
+    for (std::size_t p = 0; p < layout_.populations.size(); ++p) {
+      const PopulationPlan& population = layout_.populations[p];
+      const bool decoded = wanted[population.fields.front()];
+      if (decoded && !keyframe && !followed_[p]) {
+        throw LogError(ErrorKind::damaged, "",
+                       "a delta of population '" + population.name + "' without the frame before");
+      }
+      followed_[p] = decoded;
+      if (decoded) {
+        decode_population(population, fields, dt);
+        continue;
+      }
+      for (const std::size_t i : population.fields) set_count(i, 0);
     }
     whole_ = true;
     return frame_;
@@ -56,7 +73,8 @@ class Decoder final : public FrameDecoder {
 
  private:
   /// Everything that can be said before a byte of payload is read.
-  void check(std::span<const EncodedField> fields, bool keyframe, bool history) const {
+  void check(std::span<const EncodedField> fields, const std::vector<bool>& wanted, bool keyframe,
+             bool history) const {
     if (fields.size() != schema_.fields.size()) {
       throw LogError(ErrorKind::damaged, "",
                      "a record of " + std::to_string(fields.size()) + " fields, the schema has " +
@@ -68,6 +86,7 @@ class Decoder final : public FrameDecoder {
     std::uint64_t raw = 0;
     std::uint64_t stored = 0;
     for (std::size_t i = 0; i < fields.size(); ++i) {
+      if (!wanted[i]) continue;
       const FieldDescriptor& field = schema_.fields[i];
       const std::uint64_t count_max = limits_.field_bytes_max / field.bytes_per_particle();
       if (fields[i].count > count_max) {
@@ -213,7 +232,8 @@ class Decoder final : public FrameDecoder {
   std::vector<std::unique_ptr<DynamicField>> dynamic_;  ///< per field; null where not dynamic
   std::vector<std::uint64_t> sources_;
   Frame frame_;
-  bool whole_ = false;  ///< the last frame was decoded to its end
+  std::vector<bool> followed_;  ///< per population: it was part of the last frame decoded
+  bool whole_ = false;          ///< the last frame was decoded to its end
 };
 
 }  // namespace

@@ -25,7 +25,9 @@ FrameReader::FrameReader(RecordSource& source, const Schema& schema, std::uint64
     : source_(source),
       schema_(schema),
       particles_max_(particles_max),
-      decoder_(FrameDecoder::create(schema, codec_limits(source.limits()))) {}
+      decoder_(FrameDecoder::create(schema, codec_limits(source.limits()))),
+      all_(schema.fields.size(), true),
+      none_(schema.fields.size(), false) {}
 
 void FrameReader::fail(const Record& record, const std::string& text) const {
   throw LogError(ErrorKind::damaged, source_.file().path(),
@@ -70,21 +72,31 @@ void FrameReader::check_shape(const Record& record, const StepMessage& message) 
   }
 }
 
-bool FrameReader::load_body(const Record& record, const StepMessage& message, bool with_fields) {
+bool FrameReader::load_body(const Record& record, const StepMessage& message,
+                            const std::vector<bool>& wanted) {
   check_shape(record, message);
-  tables_at_ = 0;
-  for (const FieldBlob& blob : message.fields) tables_at_ += aligned(blob.stored);
-  const std::uint64_t skipped = with_fields ? 0 : tables_at_;
-  tables_at_ -= skipped;
-  body_.resize(record.header.body_bytes - skipped);
-  source_.read_bytes(record.body_offset() + skipped, body_);
+  tables_at_ = skipped_ = 0;
+  bool reading = false;
+  for (std::size_t i = 0; i < message.fields.size(); ++i) {
+    reading = reading || wanted[i];
+    (reading ? tables_at_ : skipped_) += aligned(message.fields[i].stored);
+  }
+  body_.resize(record.header.body_bytes - skipped_);
+  source_.read_bytes(record.body_offset() + skipped_, body_);
   std::uint64_t at = 0;
   const auto holds = [&](std::uint64_t expected, std::uint32_t stored) {
     const auto blob = std::span(body_).subspan(at, stored);
     at += aligned(stored);
     return !record.header.has_checksums() || checksum(blob) == expected;
   };
-  for (std::size_t i = 0; with_fields && i < message.fields.size(); ++i) {
+  reading = false;
+  for (std::size_t i = 0; i < message.fields.size(); ++i) {
+    reading = reading || wanted[i];
+    if (!reading) continue;
+    if (!wanted[i]) {
+      at += aligned(message.fields[i].stored);
+      continue;
+    }
     if (holds(message.fields[i].checksum, message.fields[i].stored)) continue;
     problem_ = "the checksum of field '" + schema_.fields[i].name + "' does not hold";
     return false;
@@ -97,21 +109,28 @@ bool FrameReader::load_body(const Record& record, const StepMessage& message, bo
   return true;
 }
 
-void FrameReader::decode_fields(const Record& record, const StepMessage& message) {
+void FrameReader::decode_fields(const Record& record, const StepMessage& message,
+                                const std::vector<bool>& wanted) {
   fields_.resize(message.fields.size());
   std::uint64_t at = 0;
+  bool reading = false;
   for (std::size_t i = 0; i < fields_.size(); ++i) {
     const FieldBlob& blob = message.fields[i];
-    fields_[i].method = blob.method;
-    fields_[i].order = blob.order;
-    fields_[i].count = blob.count;
-    const auto bytes = std::span(body_).subspan(at, blob.stored);
-    fields_[i].payload.assign(bytes.begin(), bytes.end());
-    at += aligned(blob.stored);
+    reading = reading || wanted[i];
+    if (wanted[i]) {
+      fields_[i].method = blob.method;
+      fields_[i].order = blob.order;
+      fields_[i].count = blob.count;
+      const auto bytes = std::span(body_).subspan(at, blob.stored);
+      fields_[i].payload.assign(bytes.begin(), bytes.end());
+    } else {
+      fields_[i] = {};
+    }
+    if (reading) at += aligned(blob.stored);
   }
   const Frame& decoded =
-      decoder_->decode(fields_, record.header.kind == RecordKind::keyframe, record.header.step,
-                       message.time, message.dt);
+      decoder_->decode(fields_, wanted, record.header.kind == RecordKind::keyframe,
+                       record.header.step, message.time, message.dt);
   frame_.counts = decoded.counts;
   frame_.fields.resize(decoded.fields.size());
   for (std::size_t i = 0; i < decoded.fields.size(); ++i) {
@@ -147,14 +166,20 @@ void FrameReader::take_tables(const StepMessage& message) {
   }
 }
 
-bool FrameReader::read(const Record& record, const StepMessage& message) {
+bool FrameReader::read_fields(const Record& record, const StepMessage& message,
+                              const std::vector<bool>& wanted) {
   try {
-    if (!load_body(record, message, true)) return false;
-    decode_fields(record, message);
+    if (!load_body(record, message, wanted)) return false;
+    decode_fields(record, message, wanted);
     take_step(record, message);
   } catch (const LogError& error) {
     rethrow_at(error, source_.file().path(), record.offset);
   }
+  return true;
+}
+
+bool FrameReader::read(const Record& record, const StepMessage& message) {
+  if (!read_fields(record, message, all_)) return false;
   const Digest digest = digest_frame(schema_, frame_.view());
   if (digest != message.digest) {
     fail(record, fmt::format("the decoded state has digest {}, {} is recorded", digest.hex(),
@@ -163,9 +188,14 @@ bool FrameReader::read(const Record& record, const StepMessage& message) {
   return true;
 }
 
+bool FrameReader::read_some(const Record& record, const StepMessage& message,
+                            const std::vector<bool>& wanted) {
+  return read_fields(record, message, wanted);
+}
+
 bool FrameReader::read_tables(const Record& record, const StepMessage& message) {
   try {
-    if (!load_body(record, message, false)) return false;
+    if (!load_body(record, message, none_)) return false;
     frame_ = {};
     take_step(record, message);
   } catch (const LogError& error) {

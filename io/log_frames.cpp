@@ -79,8 +79,8 @@ std::uint64_t LogReaderImpl::start_of_walk(std::uint64_t from, bool decode) cons
 }
 
 void LogReaderImpl::walk_steps(
-    std::uint64_t from, std::uint64_t to, bool decode,
-    const std::function<bool(const StepHeader&, const Frame*)>& visit) const {
+    std::uint64_t from, std::uint64_t to, bool decode, const Decode& read,
+    const std::function<bool(const StepHeader&, const Frame*, bool)>& visit) const {
   if (to < from || from > last_.step) return;
   FrameReader reader(source_, genesis_.genesis.schema, genesis_.particles_max);
   RecordWalk walk(source_, start_of_walk(from, decode), RecordWalk::any_sequence, end_,
@@ -97,26 +97,72 @@ void LogReaderImpl::walk_steps(
     const StepMessage message = step_message(record);
     const StepHeader header = header_of(record, message);
     const bool decodable = chain.add(record.header) && header.has_state;
-    const bool decoded = decode && decodable && reader.read(record, message);
-    if (decode && decodable && !decoded) {
+    const Decoding decoded = decodable ? read(reader, record, message) : Decoding::none;
+    if (decoded == Decoding::failed) {
       completeness_ = Completeness::damaged;
       chain.interrupt();
     }
     if (header.step < from) continue;
-    if (!visit(header, decoded ? &reader.frame() : nullptr)) return;
+    const bool whole = decoded == Decoding::whole;
+    if (!visit(header, whole || decoded == Decoding::part ? &reader.frame() : nullptr, whole))
+      return;
   }
 }
 
 void LogReaderImpl::for_each(
     std::uint64_t from, std::uint64_t to,
     const std::function<bool(const StepHeader&, const Frame*)>& visit) const {
-  walk_steps(from, to, true, visit);
+  walk_steps(
+      from, to, true,
+      [](FrameReader& reader, const Record& record, const StepMessage& message) {
+        return reader.read(record, message) ? Decoding::whole : Decoding::failed;
+      },
+      [&visit](const StepHeader& header, const Frame* frame, bool) {
+        return visit(header, frame);
+      });
+}
+
+void LogReaderImpl::for_each_part(
+    std::uint64_t from, std::uint64_t to, const StatePart& part,
+    const std::function<bool(const StepHeader&, const Frame*, bool)>& visit) const {
+  const Schema& schema = genesis_.genesis.schema;
+  std::vector<bool> some;
+  for (const FieldDescriptor& field : schema.fields) {
+    some.push_back(std::find(part.populations.begin(), part.populations.end(), field.population) !=
+                   part.populations.end());
+  }
+  const std::vector<bool> all(schema.fields.size(), true);
+  // The next state wanted whole, and where decoding must begin to get there.
+  std::optional<std::uint64_t> next;
+  std::uint64_t begin = 0;
+  bool asked = false;
+  walk_steps(
+      from, to, true,
+      [&](FrameReader& reader, const Record& record, const StepMessage& message) {
+        const std::uint64_t step = record.header.step;
+        if (part.next_whole && (!asked || (next && *next < step))) {
+          next = part.next_whole(std::max(step, from));
+          asked = true;
+          const auto keyframe = next && *next <= to ? keyframe_at_or_before(*next) : std::nullopt;
+          begin = keyframe ? keyframe->step : step;
+          if (next && *next > to) next.reset();
+        }
+        const bool whole = (next && *next == step) ||
+                           (part.keyframes && record.header.kind == RecordKind::keyframe);
+        if (whole) return reader.read(record, message) ? Decoding::whole : Decoding::failed;
+        const bool on_the_way = next && begin <= step;
+        return reader.read_some(record, message, on_the_way ? all : some) ? Decoding::part
+                                                                         : Decoding::failed;
+      },
+      visit);
 }
 
 void LogReaderImpl::for_each_header(std::uint64_t from, std::uint64_t to,
                                     const std::function<bool(const StepHeader&)>& visit) const {
-  walk_steps(from, to, false,
-             [&visit](const StepHeader& header, const Frame*) { return visit(header); });
+  walk_steps(
+      from, to, false,
+      [](FrameReader&, const Record&, const StepMessage&) { return Decoding::none; },
+      [&visit](const StepHeader& header, const Frame*, bool) { return visit(header); });
 }
 
 bool LogReaderImpl::read_event(std::uint64_t offset, Event& event) const {

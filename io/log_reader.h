@@ -46,6 +46,15 @@ struct ByteCount {
   std::uint64_t records = 0, stored = 0, raw = 0;
 };
 
+/// What a walk over many states decodes of them.
+struct StatePart {
+  std::vector<std::string> populations;  ///< of every state; names that there are none of are legal
+  bool keyframes = false;                ///< states that are stored whole are decoded whole
+  /// Least step at or after the one given whose state is decoded whole, or none; never smaller for
+  /// a larger argument.
+  std::function<std::optional<std::uint64_t>(std::uint64_t step)> next_whole;
+};
+
 /// Not for use by several threads at once: each opens its own.
 class LogReader {
  public:
@@ -81,6 +90,12 @@ class LogReader {
   virtual void for_each(
       std::uint64_t from, std::uint64_t to,
       const std::function<bool(const StepHeader&, const Frame*)>& visit) const = 0;
+  /// The same where most states are wanted in part: `visit` is told whether the state is whole.
+  /// Where it is not, only the fields of `part.populations` are there, held by the checksums of
+  /// their blobs; other fields are empty. Whole states are checked against their digests.
+  virtual void for_each_part(
+      std::uint64_t from, std::uint64_t to, const StatePart& part,
+      const std::function<bool(const StepHeader&, const Frame*, bool whole)>& visit) const = 0;
   /// The same without decoding any state.
   virtual void for_each_header(std::uint64_t from, std::uint64_t to,
                                const std::function<bool(const StepHeader&)>& visit) const = 0;

@@ -35,6 +35,9 @@ class LogReaderImpl final : public LogReader {
   std::optional<Frame> tables(std::uint64_t step) const override;
   void for_each(std::uint64_t from, std::uint64_t to,
                 const std::function<bool(const StepHeader&, const Frame*)>& visit) const override;
+  void for_each_part(std::uint64_t from, std::uint64_t to, const StatePart& part,
+                     const std::function<bool(const StepHeader&, const Frame*, bool)>& visit)
+      const override;
   void for_each_header(std::uint64_t from, std::uint64_t to,
                        const std::function<bool(const StepHeader&)>& visit) const override;
   std::vector<Event> events() const override;
@@ -74,8 +77,12 @@ class LogReaderImpl final : public LogReader {
   // Decoding (log_frames.cpp).
   bool decode_to(const StepEntry& keyframe, std::uint64_t step) const;
   std::uint64_t start_of_walk(std::uint64_t from, bool decode) const;
-  void walk_steps(std::uint64_t from, std::uint64_t to, bool decode,
-                  const std::function<bool(const StepHeader&, const Frame*)>& visit) const;
+  /// Decodes the state of a record, or does not; false where its bytes do not hold.
+  enum class Decoding { none, failed, part, whole };
+  using Decode = std::function<Decoding(FrameReader&, const Record&, const StepMessage&)>;
+  void walk_steps(
+      std::uint64_t from, std::uint64_t to, bool decode, const Decode& read,
+      const std::function<bool(const StepHeader&, const Frame*, bool whole)>& visit) const;
 
   StepHeader header_of(const Record& record, const StepMessage& message) const;
   StepMessage step_message(const Record& record) const;

@@ -169,6 +169,47 @@ TEST_F(LogRoundTrip, ForEachVisitsEveryStepOnceInOrder) {
   EXPECT_EQ(visited, 5U);
 }
 
+TEST_F(LogRoundTrip, ForEachPartDecodesWhatIsWantedAndNothingElse) {
+  ToyOptions options;
+  options.steps = 100;
+  options.bead_added_every = 7;
+  const auto reader = record(options);
+  const auto frames = toy_frames(options);
+  for (const char* population : {"bead", "clock"}) {
+    for (const std::uint64_t from : {0U, 21U}) {
+      io::StatePart part;
+      part.populations = {population};
+      part.keyframes = from == 0;
+      // Whole at 25 and 27 (one segment), then at 71, and at none after.
+      part.next_whole = [](std::uint64_t step) -> std::optional<std::uint64_t> {
+        for (const std::uint64_t each : {25U, 27U, 71U})
+          if (each >= step) return each;
+        return std::nullopt;
+      };
+      std::uint64_t next = from, wholes = 0, without = 0;
+      reader->for_each_part(
+          from, 100, part, [&](const io::StepHeader& header, const io::Frame* frame, bool whole) {
+            EXPECT_EQ(header.step, next++);
+            EXPECT_TRUE(frame);
+            const io::Frame& expected = frames.at(header.step);
+            wholes += whole;
+            if (whole) EXPECT_TRUE(same_frame(*frame, expected)) << header.step;
+            for (std::size_t f = 0; f < frame->fields.size(); ++f) {
+              const bool wanted = toy_schema().fields[f].population == population;
+              if (wanted) EXPECT_EQ(frame->fields[f], expected.fields[f]) << header.step;
+              without += !wanted && frame->fields[f].empty();
+            }
+            EXPECT_EQ(frame->tables, expected.tables);
+            return true;
+          });
+      EXPECT_EQ(next, 101U);
+      // Keyframes at 0, 16 ... 96.
+      EXPECT_EQ(wholes, from == 0 ? 3U + 7U : 3U);
+      EXPECT_GT(without, 40U);
+    }
+  }
+}
+
 TEST_F(LogRoundTrip, TablesComeWithTheirStepAndAlone) {
   ToyOptions options;
   options.steps = 40;
