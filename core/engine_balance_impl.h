@@ -176,10 +176,12 @@ void Engine<D, P>::balance_walls(const SmoothingKernel& kernel,
       const V d = apart(state_.fluid.position[a], work_.wall_position[w]);
       const double r2 = inner<D>(d, d), slope = kernel.slope(std::sqrt(r2));
       if (!(slope < 0)) continue;
-      const V va = doubles<D>(state_.fluid.velocity[a]), own = doubles<D>(work_.wall_own_velocity[w]);
+      const V va = doubles<D>(state_.fluid.velocity[a]);
+      const V own = doubles<D>(work_.wall_own_velocity[w]);
       const double volume = work_.volume[a];
-      const V shear = 2 * c_.viscosity * volume * static_cast<double>(work_.wall_viscous_volume[w]) *
-                      slope * (r2 / (r2 + soft)) * (va - doubles<D>(work_.wall_velocity[w]));
+      const double viscous_volume = work_.wall_viscous_volume[w];
+      const V shear = 2 * c_.viscosity * volume * viscous_volume * slope * (r2 / (r2 + soft)) *
+                      (va - doubles<D>(work_.wall_velocity[w]));
       const V pressed = -(static_cast<double>(work_.push[a]) +
                           static_cast<double>(work_.wall_push[w])) *
                         volume * static_cast<double>(work_.wall_volume[w]) * slope * d;

@@ -1,170 +1,138 @@
 #include "tools/analysis.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
-#include <cstring>
 #include <memory>
 #include <tuple>
 
 #include <fmt/format.h>
 
 #include "core/constants.h"
+#include "core/criteria.h"
 #include "core/walls.h"
 #include "io/errors.h"
-#include "core/criteria.h"
+#include "tools/analysis_scalars.h"
+#include "tools/analysis_state.h"
 #include "tools/cli.h"
 #include "tools/simulation_engine.h"
 
 namespace varve::tools {
 namespace {
 
-/// A field's scalars as doubles; empty where the log has no such field.
-std::vector<double> reals(const io::Schema& schema, const io::Frame& frame,
-                          std::string_view name) {
-  std::vector<double> values;
-  const int index = schema.find(name);
-  if (index < 0) return values;
-  const auto f = static_cast<std::size_t>(index);
-  const io::FieldDescriptor& field = schema.fields[f];
-  const std::vector<std::byte>& bytes = frame.fields[f];
-  values.resize(frame.counts[f] * field.components);
-  if (field.type == io::ScalarType::f64) {
-    if (!values.empty()) std::memcpy(values.data(), bytes.data(), bytes.size());
-    return values;
-  }
-  for (std::size_t k = 0; k < values.size(); ++k) {
-    float value;
-    std::memcpy(&value, bytes.data() + k * sizeof value, sizeof value);
-    values[k] = static_cast<double>(value);
-  }
-  return values;
-}
-
-std::vector<std::uint64_t> ids(const io::Schema& schema, const io::Frame& frame,
-                               std::string_view name) {
-  const int index = schema.find(name);
-  std::vector<std::uint64_t> values;
-  if (index < 0) return values;
-  const auto f = static_cast<std::size_t>(index);
-  values.resize(frame.counts[f]);
-  if (!values.empty())
-    std::memcpy(values.data(), frame.fields[f].data(), frame.fields[f].size());
-  return values;
-}
-
-/// One column of a table, by name, as doubles (whole numbers up to 2^53 exactly).
-class TableReader {
- public:
-  TableReader(const io::Schema& schema, std::string_view table) : schema_(schema) {
-    for (std::size_t t = 0; t < schema.tables.size(); ++t)
-      if (schema.tables[t].name == table) table_ = static_cast<int>(t);
-  }
-  std::uint64_t rows(const io::Frame& frame) const {
-    return table_ < 0 ? 0 : frame.rows[static_cast<std::size_t>(table_)];
-  }
-  template <class T>
-  T at(const io::Frame& frame, std::string_view column, std::uint64_t row) const {
-    const io::TableDescriptor& table = schema_.tables[static_cast<std::size_t>(table_)];
-    for (std::size_t c = 0; c < table.columns.size(); ++c) {
-      if (table.columns[c].name != column) continue;
-      const auto& bytes = frame.tables[static_cast<std::size_t>(table_)][c];
-      T value{};
-      std::memcpy(&value, bytes.data() + row * sizeof value, sizeof value);
-      return value;
-    }
-    return T{};
-  }
-
- private:
-  const io::Schema& schema_;
-  int table_ = -1;
-};
-
-std::vector<core::ContactRow> contact_rows(const TableReader& table, const io::Frame& frame,
-                                           std::size_t dimension) {
-  static constexpr const char* impulses[] = {"impulse_x", "impulse_y", "impulse_z"};
-  std::vector<core::ContactRow> rows(table.rows(frame));
-  for (std::uint64_t r = 0; r < rows.size(); ++r) {
-    core::ContactRow& row = rows[r];
-    row.grain = table.at<std::uint64_t>(frame, "grain", r);
-    row.partner = table.at<std::uint64_t>(frame, "partner", r);
-    row.kind = table.at<std::uint8_t>(frame, "kind", r);
-    row.begin = table.at<std::uint8_t>(frame, "begin", r) != 0;
-    row.end = table.at<std::uint8_t>(frame, "end", r) != 0;
-    row.peak_force = table.at<double>(frame, "peak_force", r);
-    row.peak_overlap = table.at<double>(frame, "peak_overlap", r);
-    for (std::size_t k = 0; k < dimension; ++k)
-      row.impulse[k] = table.at<double>(frame, impulses[k], r);
-    row.impact_speed = table.at<double>(frame, "impact_speed", r);
-    row.rebound_speed = table.at<double>(frame, "rebound_speed", r);
-    row.normal_loss = table.at<double>(frame, "normal_loss", r);
-    row.tangential_loss = table.at<double>(frame, "tangential_loss", r);
-    row.friction_loss = table.at<double>(frame, "friction_loss", r);
-  }
-  return rows;
-}
-
 /// Curves that the summary is made of. When they are full, every second sample goes and from then
 /// on every second one is taken: memory does not grow with the log.
 class Curves {
  public:
   void take(double time, double settling, double fastest) {
-    if (count_++ % every_ != 0) return;
-    if (time_.size() == samples_max) halve();
-    time_.push_back(time);
-    settling_.push_back(settling);
-    fastest_.push_back(fastest);
+    curves_.take(time, {settling, fastest});
   }
-  const std::vector<double>& time() const { return time_; }
-  const std::vector<double>& settling() const { return settling_; }
-  const std::vector<double>& fastest() const { return fastest_; }
+  const std::vector<double>& time() const { return curves_.time(); }
+  const std::vector<double>& settling() const { return curves_.curve(0); }
+  const std::vector<double>& fastest() const { return curves_.curve(1); }
 
  private:
-  static constexpr std::size_t samples_max = std::size_t{1} << 18;
-  void halve() {
-    for (auto* curve : {&time_, &settling_, &fastest_}) {
-      for (std::size_t k = 0; 2 * k < curve->size(); ++k) (*curve)[k] = (*curve)[2 * k];
-      curve->resize((curve->size() + 1) / 2);
-    }
-    every_ *= 2;
-  }
-  std::uint64_t count_ = 0, every_ = 1;
-  std::vector<double> time_, settling_, fastest_;
+  CurveSet curves_{2, std::size_t{1} << 18};
 };
 
 constexpr double rest_speed = 1e-3;  // [m/s]
+/// Grains whose surfaces are at most this many diameters apart belong to one cluster.
+constexpr double cluster_link = 0.5;
+constexpr std::uint64_t never = ~std::uint64_t{0};
+
+/// Where a change of the width put the walls.
+struct MovedWalls {
+  std::uint64_t step;
+  double left, width;
+};
+std::vector<MovedWalls> moved_walls(const io::LogReader& log) {
+  std::vector<MovedWalls> moves;
+  for (const io::Event& event : log.events()) {
+    if (event.kind != "walls") continue;
+    MovedWalls move{event.step, 0, 0};
+    for (const auto& [key, value] : event.items) {
+      double number = 0;
+      std::from_chars(value.data(), value.data() + value.size(), number);
+      if (key == "left") move.left = number;
+      if (key == "width") move.width = number;
+    }
+    if (move.width > 0) moves.push_back(move);
+  }
+  return moves;
+}
+
+/// What the walk needs of the constants of a run, whatever its dimension.
+struct Species {
+  std::vector<double> radius, mass, inertia;
+  std::vector<std::vector<double>> weight;  // [N] components
+  std::vector<double> down, period;
+};
+template <int D>
+Species species_of(const core::Scenario& scenario) {
+  const core::Constants<D> c = core::constants_of<D>(scenario);
+  Species all;
+  for (const core::SpeciesConstants<D>& one : c.species) {
+    all.radius.push_back(one.radius);
+    all.mass.push_back(one.mass);
+    all.inertia.push_back(one.inertia);
+    all.weight.emplace_back(one.weight.data(), one.weight.data() + D);
+  }
+  all.down.assign(3, 0.0);
+  all.period.assign(3, 0.0);
+  double g2 = 0;
+  for (int k = 0; k < D; ++k) {
+    all.period[static_cast<std::size_t>(k)] = c.period.length[k];
+    g2 += c.gravity[k] * c.gravity[k];
+  }
+  for (int k = 0; k < D; ++k)
+    all.down[static_cast<std::size_t>(k)] =
+        g2 > 0 ? c.gravity[k] / std::sqrt(g2) : (k == 1 ? -1.0 : 0.0);
+  return all;
+}
 
 class Walk {
  public:
   Walk(const io::LogReader& log, const core::Scenario& scenario, const AnalysisRequest& request,
        const RowSink& sink)
       : log_(log), scenario_(scenario), request_(request), sink_(sink),
-        schema_(log.genesis().schema), contacts_(schema_, "contacts"), work_(schema_, "work") {
+        schema_(log.genesis().schema), contacts_(schema_, "contacts"), work_(schema_, "work"),
+        species_(scenario.domain.dimension == 2 ? species_of<2>(scenario)
+                                                : species_of<3>(scenario)),
+        moves_(moved_walls(log)), scalars_(scenario) {
     const auto dimension = static_cast<std::size_t>(scenario.domain.dimension);
     now_.grains.dimension = dimension;
-    now_.gravity.assign(3, 0.0);
-    now_.down.assign(3, 0.0);
-    now_.period.assign(3, 0.0);
+    now_.down = species_.down;
+    now_.period = species_.period;
+    now_.walls = scenario.domain;
     now_.points = request.points;
     now_.fluid.dimension = dimension;
-    now_.fluid.smoothing_length = core::smoothing_length(scenario);
+    now_.fluid.smoothing_length = scenario.has_fluid() ? core::smoothing_length(scenario) : 0;
     now_.fluid.kernel = scenario.fluid.kernel;
-    for (const Observable* table : request.tables) needs_forces_ |= table->forces;
-    if (dimension == 2)
-      set_directions(core::constants_of<2>(scenario));
-    else
-      set_directions(core::constants_of<3>(scenario));
+    for (std::size_t k = 0; k < 3; ++k) now_.fluid.period[k] = now_.period[k];
+    needs_fluid_ = needs_lattice_ = request.pictures;
+    for (const Observable* table : request.tables) {
+      needs_fluid_ = needs_fluid_ || table->needs != Needs::grains;
+      needs_forces_ = needs_forces_ || table->needs == Needs::forces;
+      needs_lattice_ = needs_lattice_ || table->lattice;
+    }
+    rule_ = request.fluid.value_or(FluidSteps{
+        needs_fluid_ ? FluidSteps::Rule::as_range : FluidSteps::Rule::keyframes, 1});
+    evaluates_scalars_ = log.genesis().engine_revision == core::engine_revision;
   }
 
   AnalysisSummary run() {
     AnalysisSummary& s = summary_;
     s.stride = request_.range.stride;
     for (const Observable* table : request_.tables) sink_(*table, table->columns(scenario_));
-    log_.for_each(request_.range.first, request_.range.last,
-                  [&](const io::StepHeader& header, const io::Frame* frame) {
-                    take(header, frame);
-                    return true;
-                  });
+    io::StatePart part;
+    part.populations = {"grains", "contacts"};
+    part.keyframes = rule_.rule == FluidSteps::Rule::keyframes;
+    part.next_whole = [this](std::uint64_t step) { return next_whole(step); };
+    log_.for_each_part(request_.range.first, request_.range.last, part,
+                       [&](const io::StepHeader& header, const io::Frame* frame, bool whole) {
+                         take(header, frame, whole);
+                         return true;
+                       });
     if (s.states == 0)
       throw UsageError(fmt::format(
           "{}: no state of steps {} to {} is stored; observables need recorded states (tier "
@@ -175,47 +143,65 @@ class Walk {
   }
 
  private:
-  template <class Constants>
-  void set_directions(const Constants& c) {
-    double g2 = 0;
-    for (int k = 0; k < static_cast<int>(now_.grains.dimension); ++k) {
-      now_.gravity[static_cast<std::size_t>(k)] = c.gravity[k];
-      now_.period[static_cast<std::size_t>(k)] = c.period.length[k];
-      g2 += c.gravity[k] * c.gravity[k];
+  std::uint64_t whole_stride() const {
+    switch (rule_.rule) {
+      case FluidSteps::Rule::as_range: return request_.range.stride;
+      case FluidSteps::Rule::every: return rule_.every;
+      case FluidSteps::Rule::keyframes: break;
     }
-    for (std::size_t k = 0; k < 3; ++k)
-      now_.down[k] = g2 > 0 ? now_.gravity[k] / std::sqrt(g2) : (k == 1 ? -1.0 : 0.0);
-    for (std::size_t k = 0; k < 3; ++k) now_.fluid.period[k] = now_.period[k];
-    // In the excess form the fluid carries its share of a grain's weight before any motion.
-    if (c.coupled && !c.full_pressure)
-      for (double& each : now_.gravity)
-        each *= 1 - scenario_.fluid.density / scenario_.grains.density;
+    return never;
+  }
+  std::optional<std::uint64_t> next_whole(std::uint64_t step) const {
+    const StepRange& r = request_.range;
+    const std::uint64_t stride = whole_stride();
+    // Between keyframes only the last state is wanted.
+    if (stride == never)
+      return step <= r.last ? std::optional(r.last) : std::nullopt;
+    const std::uint64_t past = (step - r.first) % stride;
+    return past == 0 ? step : step + (stride - past);
   }
 
-  void take(const io::StepHeader& header, const io::Frame* frame) {
+  void take(const io::StepHeader& header, const io::Frame* frame, bool whole) {
     now_.step = header.step;
     now_.time = header.time;
     now_.dt = header.dt;
+    for (; moves_taken_ < moves_.size() && moves_[moves_taken_].step <= header.step;
+         ++moves_taken_) {
+      now_.walls.left = moves_[moves_taken_].left;
+      now_.walls.width = moves_[moves_taken_].width;
+    }
     const bool due = (header.step - request_.range.first) % request_.range.stride == 0;
     if (summary_.states == 0 && frame) summary_.first_step = header.step;
     if (frame)
       take_contacts(*frame);
     else if (const auto tables = log_.tables(header.step))
       take_contacts(*tables);
-    if (frame && due) take_state(*frame);
+    const bool taken = frame && (due || whole);
+    if (taken) take_state(*frame, due, whole);
     for (const Observable* table : request_.tables) {
-      if (!table->every_step && !(frame && due)) continue;
+      const bool ready = table->needs == Needs::grains ? frame && due
+                         : table->needs == Needs::fluid ? taken && whole
+                                                        : taken && whole && evaluated_;
+      if (!ready && !table->every_step) continue;
       table->rows(scenario_, now_,
                   [&](std::vector<std::string> row) { sink_(*table, row); });
     }
+    if (taken && request_.on_state) request_.on_state(scenario_, now_, whole);
   }
 
   void take_contacts(const io::Frame& frame) {
     now_.contacts = contact_rows(contacts_, frame, now_.grains.dimension);
-    const core::ContactTotals totals = core::contact_totals(now_.contacts);
-    now_.normal_loss += totals.normal_loss;
-    now_.tangential_loss += totals.tangential_loss;
-    now_.friction_loss += totals.friction_loss;
+    double at_walls = 0, normal = 0, tangential = 0, friction = 0;
+    for (const core::ContactRow& row : now_.contacts) {
+      normal += row.normal_loss;
+      tangential += row.tangential_loss;
+      friction += row.friction_loss;
+      if (row.kind == 1) at_walls += row.normal_loss + row.tangential_loss + row.friction_loss;
+    }
+    now_.normal_loss += normal;
+    now_.tangential_loss += tangential;
+    now_.friction_loss += friction;
+    budget_.take_contacts(normal, tangential, friction, at_walls);
     now_.drag_work = now_.hydrodynamic_work = 0;
     if (work_.rows(frame) > 0) {
       now_.drag_work = work_.at<double>(frame, "drag_on_grains", 0);
@@ -238,19 +224,25 @@ class Walk {
     for (const core::WallHit& hit : now_.hits)
       if (hit.impact_speed > rest_speed) restitutions_.push_back(hit.restitution);
     s.wall_hits += now_.hits.size();
+    scalars_.take_step(now_);
   }
 
-  void take_state(const io::Frame& frame) {
-    id_ = ids(schema_, frame, "grains.id");
+  void take_grains(const io::Frame& frame) {
+    id_ = wholes(schema_, frame, "grains.id");
     position_ = reals(schema_, frame, "grains.position");
     velocity_ = reals(schema_, frame, "grains.velocity");
     spin_ = reals(schema_, frame, "grains.spin");
-    const double d = scenario_.grains.diameter;
-    constexpr double pi = 3.14159265358979323846;
-    const double volume =
-        now_.grains.dimension == 2 ? 0.25 * pi * d * d : pi * d * d * d / 6;
-    radius_.assign(id_.size(), 0.5 * d);
-    mass_.assign(id_.size(), scenario_.grains.density * volume);
+    const std::vector<std::uint64_t> kinds = wholes(schema_, frame, "grains.species");
+    radius_.clear();
+    mass_.clear();
+    now_.weights.clear();
+    for (const std::uint64_t each : kinds) {
+      const auto kind = static_cast<std::size_t>(each);
+      radius_.push_back(species_.radius.at(kind));
+      mass_.push_back(species_.mass.at(kind));
+      const std::vector<double>& weight = species_.weight[kind];
+      now_.weights.insert(now_.weights.end(), weight.begin(), weight.end());
+    }
     core::GrainView& g = now_.grains;
     g.id = id_;
     g.position = position_;
@@ -258,18 +250,36 @@ class Walk {
     g.spin = spin_;
     g.radius = radius_;
     g.mass = mass_;
-    take_fluid(frame);
+  }
+
+  void take_network() {
+    const core::GrainView& g = now_.grains;
+    now_.group = core::group_motion(g, now_.down);
+    now_.links = core::contact_links(g, now_.contacts, now_.dt, now_.walls, now_.period);
+    now_.stresses = core::grain_stresses(g, now_.links);
+    now_.chains = core::force_chains(g.size(), now_.links);
+    now_.clusters = core::clusters_of(g, cluster_link * scenario_.grains.diameter, now_.period);
+    now_.departures = departures_.take(g, now_.clusters);
+    now_.apart = departures_.apart();
+  }
+
+  void take_state(const io::Frame& frame, bool due, bool whole) {
+    take_grains(frame);
+    if (due) take_network();
+    else now_.group = core::group_motion(now_.grains, now_.down);
+    if (whole) take_fluid(frame);
     AnalysisSummary& s = summary_;
+    if (!due) return;
     if (s.states == 0) s.first_time = now_.time;
     ++s.states;
     s.last_step = now_.step;
     s.last_time = now_.time;
     s.grains = std::max(s.grains, id_.size());
+    scalars_.take_grains(now_);
     if (id_.empty()) return;
-    const core::GroupMotion group = core::group_motion(g, now_.down);
-    curves_.take(now_.time, group.settling_speed, group.max_speed);
-    if (s.states == 1 || group.settling_speed > s.peak_speed) {
-      s.peak_speed = group.settling_speed;
+    curves_.take(now_.time, now_.group.settling_speed, now_.group.max_speed);
+    if (s.states == 1 || now_.group.settling_speed > s.peak_speed) {
+      s.peak_speed = now_.group.settling_speed;
       s.peak_time = now_.time;
     }
   }
@@ -283,19 +293,86 @@ class Walk {
     for (std::size_t k = 0; k < fluid_velocity_.size(); ++k)
       now_.fluid_kinetic += 0.5 * fluid_volume_[k / now_.fluid.dimension] * fluid_velocity_[k] *
                             fluid_velocity_[k];
-    for (std::size_t a = 0; a < rhob.size(); ++a) fluid_volume_[a] /= rhob[a];
-    pressure_.clear();
-    if (needs_forces_) {
-      if (!engine_) engine_ = SimulationEngine::of_genesis(log_.genesis(), log_.path(), {});
-      engine_->restore(frame.view());
-      engine_->evaluate();
-      now_.forces = engine_->simulation().grain_reports();
-      pressure_ = engine_->simulation().fluid_report().pressure;
+    superficial_volume_ = fluid_volume_;
+    for (std::size_t a = 0; a < rhob.size(); ++a) {
+      superficial_volume_[a] /= scenario_.fluid.density;
+      fluid_volume_[a] /= rhob[a];
     }
+    // Numbers of the run rest on states that far apart; tables may ask for more.
+    const bool sampled = now_.step >= next_sample_;
+    if (sampled) next_sample_ = now_.step + log_.genesis().keyframe_steps;
+    pressure_.clear();
+    evaluated_ = (needs_forces_ || (sampled && evaluates_scalars_)) && evaluate(frame);
     now_.fluid.position = fluid_position_;
     now_.fluid.velocity = fluid_velocity_;
     now_.fluid.volume = fluid_volume_;
     now_.fluid.pressure = pressure_;
+    now_.superficial = now_.fluid;
+    now_.superficial.volume = superficial_volume_;
+    const bool looks = scenario_.has_fluid() && (sampled || needs_lattice_);
+    now_.lattice = {};
+    now_.beneath.reset();
+    now_.above.reset();
+    if (looks) look_at_flow();
+    if (sampled || evaluated_) scalars_.take_fluid(now_, evaluated_, clamps_);
+  }
+
+  void look_at_flow() {
+    const double spacing = scenario_.fluid.spacing;
+    now_.lattice = core::flow_lattice(now_.fluid, now_.walls, spacing);
+    now_.features = core::flow_features(
+        now_.lattice, std::min(2 * scenario_.grains.diameter, now_.walls.width / 8));
+    const core::GrainView& g = now_.grains;
+    if (g.size() == 0) return;
+    const std::size_t d = g.dimension;
+    double from = g.position[0], to = from;
+    for (std::size_t i = 0; i < g.size(); ++i) {
+      from = std::min(from, g.position[i * d] - g.radius[i]);
+      to = std::max(to, g.position[i * d] + g.radius[i]);
+    }
+    now_.through = core::flow_through(now_.superficial, now_.walls, spacing,
+                                      now_.group.centroid[1], from, to,
+                                      now_.group.mean_velocity[1]);
+    std::vector<double> places;
+    for (const double y : {now_.group.lowest - scenario_.grains.diameter,
+                           now_.group.highest + scenario_.grains.diameter}) {
+      places.push_back(now_.group.centroid[0]);
+      places.push_back(y);
+      if (d == 3) places.push_back(now_.group.centroid[2]);
+    }
+    const std::vector<core::FluidAtPoint> at = core::sample_fluid(now_.fluid, places);
+    now_.beneath = at[0];
+    now_.above = at[1];
+  }
+
+  /// Forces at the state; false where a guard of the engine stops them (the last state of a run
+  /// that failed).
+  bool evaluate(const io::Frame& frame) {
+    if (!engine_) engine_ = SimulationEngine::of_genesis(log_.genesis(), log_.path(), {});
+    try {
+      engine_->revisit(frame.view());
+      clamps_ = engine_->simulation().counters();
+      engine_->evaluate();
+    } catch (const EngineFailure&) {
+      now_.forces.clear();
+      return false;
+    }
+    const core::Simulation& simulation = engine_->simulation();
+    const core::Counters& after = simulation.counters();
+    clamps_.porosity_clamps = after.porosity_clamps - clamps_.porosity_clamps;
+    clamps_.drag_porosity_clamps = after.drag_porosity_clamps - clamps_.drag_porosity_clamps;
+    clamps_.weak_coupling = after.weak_coupling - clamps_.weak_coupling;
+    now_.forces = simulation.grain_reports();
+    pressure_ = simulation.fluid_report().pressure;
+    now_.balance = simulation.balance();
+    now_.budget = budget_.take(now_.step, now_.time, simulation.clock().dt, now_.balance,
+                               now_.grains, energy(), now_.weights);
+    return true;
+  }
+
+  core::GrainEnergy energy() const {
+    return core::grain_energy(now_.grains, now_.grains.dimension == 2 ? 0.5 : 0.4,
+                              std::vector<double>(now_.grains.dimension, 0.0));
   }
 
   void summarize() {
@@ -304,8 +381,7 @@ class Walk {
     s.tangential_loss = now_.tangential_loss;
     s.friction_loss = now_.friction_loss;
     s.restitution = core::spread_of(restitutions_);
-    if (curves_.time().empty()) return;
-    double from, to;
+    double from = s.first_time, to = s.last_time;
     if (request_.window) {
       std::tie(from, to) = *request_.window;
       s.window_rule = "as asked";
@@ -316,13 +392,16 @@ class Walk {
                           ? "second half of the time to the first contact with the floor"
                           : "second half of the run";
     }
-    s.settling = core::window_of(curves_.time(), curves_.settling(), from, to);
-    if (s.settling) {
-      s.acceleration_time =
-          core::rise_time(curves_.time(), curves_.settling(), s.settling->mean, 0.95);
-      take_turns(from, to);
+    if (!curves_.time().empty()) {
+      s.settling = core::window_of(curves_.time(), curves_.settling(), from, to);
+      if (s.settling) {
+        s.acceleration_time =
+            core::rise_time(curves_.time(), curves_.settling(), s.settling->mean, 0.95);
+        take_turns(from, to);
+      }
+      s.rest_time = core::rest_time(curves_.time(), curves_.fastest(), rest_speed);
     }
-    s.rest_time = core::rest_time(curves_.time(), curves_.fastest(), rest_speed);
+    s.scalars = scalars_.finish(s, from, to);
   }
 
   void take_turns(double from, double to) {
@@ -343,16 +422,27 @@ class Walk {
   const RowSink& sink_;
   const io::Schema& schema_;
   TableReader contacts_, work_;
+  Species species_;
+  std::vector<MovedWalls> moves_;
+  std::size_t moves_taken_ = 0;
+  ScalarCollector scalars_;
   ObservedStep now_;
   AnalysisSummary summary_;
   Curves curves_;
+  EnergyBudget budget_;
   core::WallHits hits_;
+  core::Departures departures_;
   std::vector<double> restitutions_;
   std::vector<std::uint64_t> id_;
   std::vector<double> position_, velocity_, spin_, radius_, mass_;
-  std::vector<double> fluid_position_, fluid_velocity_, fluid_volume_, pressure_;
+  std::vector<double> fluid_position_, fluid_velocity_, fluid_volume_, superficial_volume_,
+      pressure_;
   std::unique_ptr<SimulationEngine> engine_;
-  bool needs_forces_ = false;
+  core::Counters clamps_;
+  FluidSteps rule_;
+  std::uint64_t next_sample_ = 0;
+  bool needs_fluid_ = false, needs_forces_ = false, needs_lattice_ = false;
+  bool evaluates_scalars_ = false, evaluated_ = false;
 };
 
 }  // namespace

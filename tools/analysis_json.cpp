@@ -51,6 +51,11 @@ nlohmann::ordered_json summary_json(const std::string& run, const AnalysisSummar
                      {"friction_loss_J", s.friction_loss}};
   if (!(s.restitution.mean == s.restitution.mean)) out["contacts"]["restitution"] = Json();
   out["rest_time_s"] = json_of(s.rest_time);
+  // Every name is there, with null where the run has nothing of the kind.
+  Json scalars = Json::object();
+  for (const ScalarInfo& info : scalar_infos()) scalars[info.name] = Json();
+  for (const Scalar& each : s.scalars) scalars[each.name] = json_of(each.value);
+  out["scalars"] = std::move(scalars);
   return out;
 }
 

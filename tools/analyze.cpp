@@ -17,6 +17,7 @@
 #include "tools/analysis_json.h"
 #include "tools/cli.h"
 #include "tools/simulation_engine.h"
+#include "tools/snapshot.h"
 #include "tools/steps.h"
 
 namespace varve::tools {
@@ -76,13 +77,24 @@ class CsvFiles {
   std::map<const Observable*, Output> files_;
 };
 
+const char* rows_of(const Observable& table) {
+  if (table.every_step) return "of every step in the range";
+  return table.needs == Needs::grains ? "of the steps asked for"
+                                      : "of the steps asked for, or of those of --fluid";
+}
+
 void print_list(const core::Scenario& scenario) {
   for (const Observable& each : observables()) {
     print(fmt::format("{}\n  {}\n  formula  {}\n  source   {}\n  rows     {}\n  columns  {}\n",
                       each.name, each.summary, each.formula, each.source,
-                      each.every_step ? "of every step in the range" : "of the steps asked for",
-                      fmt::join(each.columns(scenario), ", ")));
+                      rows_of(each), fmt::join(each.columns(scenario), ", ")));
   }
+  print(
+      "\nNumbers of the run (--json, 'scalars'); those with * rest on the states that are decoded "
+      "whole (--fluid), those over a window on the one of the terminal speed\n");
+  for (const ScalarInfo& info : scalar_infos())
+    print(fmt::format("{}{}\n  {}\n", info.name,
+                      info.unit.empty() ? std::string() : " [" + info.unit + "]", info.formula));
 }
 
 std::vector<const Observable*> tables_asked_for(const Invocation& invocation) {
@@ -113,6 +125,19 @@ std::optional<std::pair<double, double>> window_asked_for(const Invocation& invo
   if (!(from < to))
     throw UsageError(fmt::format("--window: expected FROM < TO, got '{}'", text));
   return std::pair(from, to);
+}
+
+std::optional<FluidSteps> fluid_asked_for(const Invocation& invocation) {
+  if (!invocation.has("fluid")) return std::nullopt;
+  const std::string text = invocation.value("fluid");
+  if (text == "keyframes") return FluidSteps{FluidSteps::Rule::keyframes, 1};
+  if (text == "all") return FluidSteps{FluidSteps::Rule::every, 1};
+  std::uint64_t every = 0;
+  const auto read = std::from_chars(text.data(), text.data() + text.size(), every);
+  if (read.ec != std::errc{} || read.ptr != text.data() + text.size() || every == 0)
+    throw UsageError(
+        fmt::format("--fluid: expected keyframes, all or a number of steps >= 1, got '{}'", text));
+  return FluidSteps{FluidSteps::Rule::every, every};
 }
 
 /// Points of --at-point, and the centres of --grid's cells.
@@ -196,6 +221,37 @@ void print_summary(const io::LogReader& log, const AnalysisSummary& s) {
                       *s.rest_time));
 }
 
+/// A picture per state: the file itself where the name ends in .svg, else a folder.
+void write_picture(const std::string& where, const core::Scenario& scenario,
+                   const ObservedStep& now) {
+  std::filesystem::path path = where;
+  if (path.extension() != ".svg") {
+    std::error_code failed;
+    std::filesystem::create_directories(path, failed);
+    if (failed) throw UsageError(fmt::format("--svg: {}: {}", where, failed.message()));
+    path /= fmt::format("step_{:09}.svg", now.step);
+  }
+  const std::string text = snapshot_svg(scenario, now);
+  std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(path.c_str(), "wb"),
+                                                       &std::fclose);
+  if (!file) throw UsageError(fmt::format("--svg: {}: {}", path.string(), std::strerror(errno)));
+  const bool written = std::fwrite(text.data(), 1, text.size(), file.get()) == text.size();
+  if (std::fclose(file.release()) != 0 || !written)
+    throw ToolError(exit_output, fmt::format("{}: {}", path.string(), std::strerror(errno)));
+}
+
+void ask_for_pictures(const std::string& where, AnalysisRequest& request) {
+  const StepRange& range = request.range;
+  if (where.ends_with(".svg") && range.last - range.first >= range.stride)
+    throw UsageError(fmt::format(
+        "--svg: {} is one picture; name one step (--range STEP), or a folder for several", where));
+  request.pictures = true;
+  request.on_state = [where](const core::Scenario& scenario, const ObservedStep& now,
+                             bool whole) {
+    if (whole) write_picture(where, scenario, now);
+  };
+}
+
 int run_analyze(const Invocation& invocation) {
   const auto log = io::LogReader::open(invocation.arguments.front());
   const core::Scenario scenario = scenario_of(log->genesis(), log->path());
@@ -208,6 +264,8 @@ int run_analyze(const Invocation& invocation) {
   request.window = window_asked_for(invocation);
   request.tables = tables_asked_for(invocation);
   request.points = points_asked_for(invocation, scenario);
+  request.fluid = fluid_asked_for(invocation);
+  if (invocation.has("svg")) ask_for_pictures(invocation.value("svg"), request);
   const bool looks_at_points = std::any_of(request.tables.begin(), request.tables.end(),
                                            [](const Observable* table) { return table->points; });
   if (request.points.empty() && looks_at_points) {
@@ -251,14 +309,20 @@ Verb verb() {
       "  varve analyze column.varve --observable settling > settling.csv\n"
       "  varve analyze column.varve --observable all --csv tables --range 0::10\n"
       "  varve analyze column.varve --observable flow --grid 0.002 --range last\n"
+      "  varve analyze column.varve --observable settling,vortices --fluid keyframes --csv tables\n"
+      "  varve analyze column.varve --svg column.svg --range t=0.16s\n"
       "  varve analyze column.varve --list      what there is, with formula and source\n";
   verb.options = {
       {"observable", "NAMES", "tables to write, comma between; 'all' for every one", true, ""},
       {"csv", "PATH", "file of the table, folder of several; - for standard output", false, "-"},
       {"range", "A:B:S", "steps, each as in --at of the other verbs", false, "first:last"},
+      {"fluid", "STEPS", "whose fluid is looked at, for tables of fluid and forces and for the "
+       "numbers of the run: keyframes, all, or every so many", false, ""},
       {"window", "FROM:TO", "times that the terminal speed is taken over", false, ""},
       {"grid", "SPACING", "of the flow: points a lattice of this spacing [m] apart", false, ""},
       {"at-point", "X,Y", "of the flow: this point [m]; may be repeated", true, ""},
+      {"svg", "PATH", "a picture of each state asked for, grains over the fluid's velocity: a file "
+       "(one step), or a folder", false, ""},
       {"list", "", "names, columns, formulas and sources of the observables", false, ""},
   };
   verb.arguments_min = verb.arguments_max = 1;

@@ -141,6 +141,18 @@ void SimulationEngine::advance() {
   take_happenings();
 }
 
+void SimulationEngine::revisit(const io::FrameView& frame) {
+  // Scheduled changes move walls: which have happened is found by restore().
+  if (!simulation_ || !genesis_scenario_.changes.empty()) return restore(frame);
+  std::vector<core::FieldSpan> values;
+  for (const io::FieldView& field : frame.fields) values.push_back({field.count, field.bytes});
+  try {
+    simulation_->set_state(values);
+  } catch (const core::ModelError& error) {
+    throw io::LogError(io::ErrorKind::mismatch, "", error.what());
+  }
+}
+
 void SimulationEngine::restore(const io::FrameView& frame) {
   std::vector<core::FieldSpan> values;
   for (const io::FieldView& field : frame.fields) values.push_back({field.count, field.bytes});

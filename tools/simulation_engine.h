@@ -36,6 +36,9 @@ class SimulationEngine : public io::Engine {
   void advance() override;
   /// Throws LogError(mismatch) where the state is not one of this scenario's.
   void restore(const io::FrameView& frame) override;
+  /// The same for one state after the other of a run whose keys nobody else changes: the engine is
+  /// kept where it can be.
+  void revisit(const io::FrameView& frame);
   /// Throws UsageError where a key may not change or its new value cannot be served.
   void change(const std::vector<io::Setting>& settings) override { change(settings, {}); }
   void change(const std::vector<io::Setting>& settings, const core::ChangeOptions& options);

@@ -70,6 +70,69 @@ std::optional<LinearFit> linear_fit(std::span<const double> x, std::span<const d
   return fit;
 }
 
+void FitSums::add(double at_x, double at_y) {
+  const double a = at_x - origin_x, b = at_y - origin_y;
+  ++n;
+  x += a;
+  y += b;
+  xx += a * a;
+  xy += a * b;
+  yy += b * b;
+}
+
+void FitSums::add(const FitSums& other) {
+  n += other.n;
+  x += other.x;
+  y += other.y;
+  xx += other.xx;
+  xy += other.xy;
+  yy += other.yy;
+}
+
+std::optional<LinearFit> FitSums::fit(double independent) const {
+  if (n < 2) return std::nullopt;
+  const double mean_x = x / n, mean_y = y / n;
+  const double sxx = xx - n * mean_x * mean_x, sxy = xy - n * mean_x * mean_y,
+               syy = yy - n * mean_y * mean_y;
+  // What is left of x alike but for rounding.
+  if (!(sxx > 1e-12 * xx)) return std::nullopt;
+  LinearFit fit;
+  fit.points = static_cast<std::size_t>(n);
+  fit.slope = sxy / sxx;
+  fit.intercept = origin_y + mean_y - fit.slope * (origin_x + mean_x);
+  fit.correlation = syy > 0 ? sxy / std::sqrt(sxx * syy) : 0;
+  const double points = std::min(independent, n);
+  if (points > 2) {
+    // Spreads are those of all points, their number that of the independent ones.
+    const double scale = points / n, at = origin_x + mean_x;
+    const double residual = std::max(0.0, syy - fit.slope * sxy) * scale / (points - 2);
+    const double t = student_t95(static_cast<std::size_t>(points) - 2);
+    fit.slope_half_width = t * std::sqrt(residual / (sxx * scale));
+    fit.intercept_half_width = t * std::sqrt(residual * (1 / points + at * at / (sxx * scale)));
+  }
+  return fit;
+}
+
+void RoughQuantiles::add(double value) {
+  if (!(value > 0) || !std::isfinite(value)) return;
+  int exponent = 0;
+  const double part = std::frexp(value, &exponent);  // 0.5 <= part < 1
+  ++bins_[exponent * 64 + static_cast<int>((2 * part - 1) * 64)];
+  ++count_;
+}
+
+double RoughQuantiles::at(double part) const {
+  const double wanted = part * static_cast<double>(count_);
+  std::uint64_t seen = 0;
+  for (const auto& [bin, count] : bins_) {
+    seen += count;
+    if (static_cast<double>(seen) < wanted) continue;
+    const int exponent = bin >= 0 ? bin / 64 : -((63 - bin) / 64);
+    return std::ldexp(0.5 * (1 + (static_cast<double>(bin - 64 * exponent) + 0.5) / 64), exponent);
+  }
+  return 0;
+}
+
 std::optional<Window> window_of(std::span<const double> t, std::span<const double> y, double from,
                                 double to) {
   std::vector<double> times, values;

@@ -3,6 +3,8 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <map>
 #include <optional>
 #include <span>
 #include <vector>
@@ -31,6 +33,33 @@ struct LinearFit {
   std::size_t points = 0;
 };
 std::optional<LinearFit> linear_fit(std::span<const double> x, std::span<const double> y);
+
+/// Sums from which the same fit follows, for more points than one keeps. `origin_x`, `origin_y`:
+/// values near all points, so that nothing cancels.
+struct FitSums {
+  double origin_x = 0, origin_y = 0;
+  double n = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0;
+  void add(double at_x, double at_y);
+  /// Of sums with the same origin.
+  void add(const FitSums& other);
+  /// `independent`: how many of the points are independent of each other, at most n: what the
+  /// intervals rest on.
+  std::optional<LinearFit> fit(double independent) const;
+};
+
+/// Quantiles of any number of positive values from a histogram with 64 bins per octave: within
+/// 0.6 %. Values that are not positive are left out.
+class RoughQuantiles {
+ public:
+  void add(double value);
+  std::uint64_t count() const { return count_; }
+  /// 0 <= part <= 1; 0 without values.
+  double at(double part) const;
+
+ private:
+  std::map<int, std::uint64_t> bins_;
+  std::uint64_t count_ = 0;
+};
 
 /// Two-sided 95 % quantile of Student's t with `degrees` >= 1 degrees of freedom: tabulated to 30
 /// (Abramowitz and Stegun 1972, table 26.10), beyond by the expansion in 1/degrees (26.7.5).

@@ -87,7 +87,7 @@ double shadow_length(const GrainView& grains) {
 }
 
 double shadow_area(const GrainView& grains, double step) {
-  std::map<std::pair<std::int64_t, std::int64_t>, bool> cells;
+  std::vector<std::pair<std::int64_t, std::int64_t>> cells;
   for (std::size_t i = 0; i < grains.size(); ++i) {
     const double x = grains.position[3 * i], z = grains.position[3 * i + 2], r = grains.radius[i];
     const auto cell = [&](double at) { return static_cast<std::int64_t>(std::floor(at / step)); };
@@ -95,9 +95,11 @@ double shadow_area(const GrainView& grains, double step) {
       for (std::int64_t b = cell(z - r); b <= cell(z + r); ++b) {
         const double dx = (static_cast<double>(a) + 0.5) * step - x;
         const double dz = (static_cast<double>(b) + 0.5) * step - z;
-        if (dx * dx + dz * dz <= r * r) cells[{a, b}] = true;
+        if (dx * dx + dz * dz <= r * r) cells.emplace_back(a, b);
       }
   }
+  std::sort(cells.begin(), cells.end());
+  cells.erase(std::unique(cells.begin(), cells.end()), cells.end());
   return static_cast<double>(cells.size()) * step * step;
 }
 
@@ -130,7 +132,7 @@ double compactness(const GrainView& grains, const Domain& walls) {
   constexpr double pi = 3.14159265358979323846;
   const double section = walls.shape == Shape::pipe ? 0.25 * pi * walls.width * walls.width
                                                     : walls.width * walls.depth;
-  return shadow_area(grains, least / 8) / section;
+  return shadow_area(grains, least / 16) / section;
 }
 
 std::vector<double> wall_distances(const GrainView& grains, const Domain& walls) {

@@ -172,7 +172,6 @@ TEST_F(LogRoundTrip, ForEachVisitsEveryStepOnceInOrder) {
 TEST_F(LogRoundTrip, ForEachPartDecodesWhatIsWantedAndNothingElse) {
   ToyOptions options;
   options.steps = 100;
-  options.bead_added_every = 7;
   const auto reader = record(options);
   const auto frames = toy_frames(options);
   for (const char* population : {"bead", "clock"}) {
@@ -193,10 +192,10 @@ TEST_F(LogRoundTrip, ForEachPartDecodesWhatIsWantedAndNothingElse) {
             EXPECT_TRUE(frame);
             const io::Frame& expected = frames.at(header.step);
             wholes += whole;
-            if (whole) EXPECT_TRUE(same_frame(*frame, expected)) << header.step;
+            EXPECT_TRUE(!whole || same_frame(*frame, expected)) << header.step;
             for (std::size_t f = 0; f < frame->fields.size(); ++f) {
               const bool wanted = toy_schema().fields[f].population == population;
-              if (wanted) EXPECT_EQ(frame->fields[f], expected.fields[f]) << header.step;
+              EXPECT_TRUE(!wanted || frame->fields[f] == expected.fields[f]) << header.step;
               without += !wanted && frame->fields[f].empty();
             }
             EXPECT_EQ(frame->tables, expected.tables);

@@ -147,8 +147,15 @@ TEST_F(Analyze, WhatItCannotDoIsSaid) {
 TEST_F(Analyze, TheListNamesEveryColumnsFormulaAndSource) {
   const std::string list = verb(0, {"analyze", crowd_, "--list"}).output;
   for (const char* name : {"settling", "trajectories", "rows", "columns", "gaps", "porosity",
-                           "contacts", "wall_hits", "energy", "forces", "flow"})
+                           "contacts", "wall_hits", "energy", "forces", "flow", "energy_budget",
+                           "momentum", "vortices", "profile", "flux", "beneath", "stress",
+                           "row_stress", "column_stress", "chains", "shape", "row_shape",
+                           "detachment", "wall_distance"})
     EXPECT_THAT(list, HasSubstr(std::string(name) + "\n"));
+  const Json summary = json_verb(0, {"analyze", crowd_});
+  EXPECT_GT(summary["scalars"].size(), 60u);
+  for (const auto& [name, value] : summary["scalars"].items())
+    EXPECT_THAT(list, HasSubstr("\n" + name)) << name;
   EXPECT_THAT(list, HasSubstr("settling_speed_m_s"));
 }
 
@@ -165,6 +172,81 @@ TEST_F(Analyze, ForcesAreThoseThatMoveTheGrainNext) {
     EXPECT_NEAR(mass * change / dt, force, 1e-9 * std::abs(force)) << n;
     EXPECT_GT(std::stod(forces.at("drag_coefficient")[n]), 1);
   }
+}
+
+TEST_F(Analyze, NumbersOfTheRunAreThoseOfItsTables) {
+  const Json all = json_verb(0, {"analyze", crowd_, "--fluid", "all"});
+  const Json& scalars = all["scalars"];
+  EXPECT_EQ(scalars["terminal_speed_m_s"], all["settling"]["terminal_speed_m_s"]);
+  EXPECT_EQ(scalars["first_floor_contact_s"], all["contacts"]["first_floor_s"]);
+  const auto contacts = table(crowd_, "contacts");
+  double collisions = 0;
+  for (const std::string& each : contacts.at("begun")) collisions += std::stod(each);
+  EXPECT_EQ(scalars["collisions"].get<double>() + scalars["wall_collisions"].get<double>(),
+            collisions);
+  const double end = all["settling"]["window_s"][1].get<double>(),
+               begin = all["settling"]["window_s"][0].get<double>();
+  const auto porosity = table(crowd_, "porosity");
+  double sum = 0, count = 0;
+  for (std::size_t n = 0; n < porosity.at("step").size(); ++n) {
+    const double t = std::stod(porosity.at("time_s")[n]);
+    if (t < begin || t > end) continue;
+    sum += std::stod(porosity.at("compactness")[n]);
+    ++count;
+  }
+  EXPECT_NEAR(scalars["compactness"].get<double>(), sum / count, 1e-12);
+  EXPECT_EQ(scalars["compactness_first"].get<double>(),
+            std::stod(porosity.at("compactness").front()));
+  EXPECT_LE(scalars["momentum_residual_max"].get<double>(), 1e-12);
+  // Looked at every 32 steps, keyframes and the last state: 0, 32, 64, 96, 120.
+  EXPECT_EQ(json_verb(0, {"analyze", crowd_})["scalars"]["states_evaluated"], 4);
+}
+
+TEST_F(Analyze, TheBudgetOfADiscClosesFromTheLogAlone) {
+  const std::string disc = folder_ / "single.varve";
+  verb(0, {"run", std::string(VARVE_SCENARIOS) + "/single_disc.cfg", "-o", disc, "--until",
+           "0.25s", "-q"});
+  const auto budget = table(disc, "energy_budget");
+  const double released = std::stod(budget.at("released_J").back());
+  EXPECT_GT(released, 1e-4);
+  EXPECT_LE(std::abs(std::stod(budget.at("residual_J").back())), 0.01 * released);
+  EXPECT_EQ(std::stod(budget.at("residual_share").back()),
+            std::stod(budget.at("residual_J").back()) / released);
+  EXPECT_GT(std::stod(budget.at("density_diffusion_J").back()), 0);
+  for (const std::string& each : budget.at("momentum_residual")) EXPECT_LE(std::stod(each), 1e-12);
+}
+
+TEST_F(Analyze, FluidAtKeyframesAndGrainsAtEveryStep) {
+  const std::string tables = folder_ / "tables";
+  verb(0, {"analyze", crowd_, "--observable", "settling,vortices,forces", "--fluid", "keyframes",
+           "--csv", tables, "-q"});
+  const auto steps = [&](const char* name) {
+    std::ifstream file(tables + "/" + name);
+    std::ostringstream text;
+    text << file.rdbuf();
+    return columns_of(text.str()).at("step");
+  };
+  EXPECT_EQ(steps("settling.csv").size(), 121u);
+  EXPECT_THAT(steps("vortices.csv"), testing::ElementsAre("0", "32", "64", "96", "120"));
+  EXPECT_EQ(steps("forces.csv").size(), 5u * 6);
+  EXPECT_THAT(verb(2, {"analyze", crowd_, "--fluid", "often"}).errors,
+              HasSubstr("keyframes, all or a number"));
+}
+
+TEST_F(Analyze, APictureShowsEveryGrain) {
+  const std::string picture = folder_ / "one.svg", folder = folder_ / "pictures";
+  verb(0, {"analyze", crowd_, "--svg", picture, "--range", "60", "-q"});
+  std::ifstream file(picture);
+  std::ostringstream text;
+  text << file.rdbuf();
+  for (int grain = 0; grain < 6; ++grain)
+    EXPECT_THAT(text.str(), HasSubstr("<title>grain " + std::to_string(grain) + ": "));
+  EXPECT_THAT(text.str(), HasSubstr("step 60"));
+  EXPECT_THAT(text.str(), HasSubstr("</svg>\n"));
+  EXPECT_THAT(text.str(), HasSubstr("<path d='M"));
+  verb(0, {"analyze", crowd_, "--svg", folder, "--range", "0:120:60", "-q"});
+  EXPECT_TRUE(std::filesystem::exists(folder + "/step_000000120.svg"));
+  EXPECT_THAT(verb(2, {"analyze", crowd_, "--svg", picture}).errors, HasSubstr("one picture"));
 }
 
 TEST_F(Analyze, TheFlowIsTakenAtPointsAndOnAGrid) {
