@@ -298,8 +298,9 @@ class Walk {
       superficial_volume_[a] /= scenario_.fluid.density;
       fluid_volume_[a] /= rhob[a];
     }
-    // Numbers of the run rest on states that far apart; tables may ask for more.
-    const bool sampled = now_.step >= next_sample_;
+    // Numbers of the run rest on states that far apart where only tables ask for more.
+    const bool sampled = request_.fluid || now_.step >= next_sample_ ||
+                         now_.step == request_.range.last;
     if (sampled) next_sample_ = now_.step + log_.genesis().keyframe_steps;
     pressure_.clear();
     evaluated_ = (needs_forces_ || (sampled && evaluates_scalars_)) && evaluate(frame);
