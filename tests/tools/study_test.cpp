@@ -324,7 +324,7 @@ TEST_F(Study, KilledAtAnyTimeItGoesOnToTheSameResults) {
   const char* wanted = std::getenv("VARVE_LONG");
   const int kills = wanted && std::string(wanted) != "0" ? 10 : 3;
   std::mt19937 chance(7);
-  std::uniform_real_distribution<double> part(0.05, 0.5);
+  std::uniform_real_distribution<double> part(0.05, 0.3);
   int met = 0;
   for (int k = 0; k < kills; ++k) {
     Background running({"study", "run", folder_ / "slow.study", "-j", "2", "--folder",
@@ -336,7 +336,7 @@ TEST_F(Study, KilledAtAnyTimeItGoesOnToTheSameResults) {
     const std::string csv = results("killed");
     EXPECT_TRUE(csv.empty() || csv.ends_with("\n")) << csv;
   }
-  EXPECT_GE(met, 2) << "the study was over before it could be killed";
+  EXPECT_GE(met, 1) << "the study was over before it could be killed";
   json(0, "run", {"-j", "2", "--folder", "killed"}, "slow.study");
   EXPECT_EQ(results("killed"), expected);
   for (const auto& entry : fs::recursive_directory_iterator(folder_ / "killed"))
