@@ -101,9 +101,9 @@ ValidationRow settling_row(const Suspension& fluid, double porosity, std::int64_
                         std::sqrt(porosity * mixture / fluid.density);
   Experiment run(s);
   start_settling(run, porosity, excess, published);
-  run.run_until(5 * relaxation);
+  run.run_until(5 * relaxation + period);
   double sum = 0, lab = 0, count = 0;
-  while (run.time() < 5 * relaxation + std::max(period, 2 * relaxation)) {
+  while (run.time() < 5 * relaxation + period + std::max(period, 2 * relaxation)) {
     run.step();
     const std::vector<double> v = run.field("grains.velocity");
     const std::vector<double> at = run.field("grains.position");
