@@ -70,20 +70,8 @@ std::string label_of(const std::string& path, const std::vector<std::string>& al
   return alike > 1 ? path : stem(path);
 }
 
-/// Sample k of one curve over that of another: both are taken at the same times.
-std::vector<std::pair<double, double>> joined(const Measured::Samples& x,
-                                              const std::vector<double>& x_values,
-                                              const Measured::Samples& y) {
-  std::vector<std::pair<double, double>> points;
-  const std::size_t count = std::min(x_values.size(), y.value.size());
-  for (std::size_t k = 0; k < count; ++k)
-    if (std::abs(x.time[k] - y.time[k]) <= 1e-9 * std::max(1.0, std::abs(y.time[k])))
-      points.emplace_back(x_values[k], y.value[k]);
-  return points;
-}
-
 void add_run(const std::string& path, const std::vector<std::string>& runs,
-             const std::vector<Curve>& curves, bool over_curve, SvgPlot& plot) {
+             const std::vector<Curve>& curves, bool over_curve, Plot& plot) {
   const auto log = io::LogReader::open(path);
   const core::Scenario scenario = scenario_of(log->genesis(), log->path());
   Measured measured;
@@ -96,12 +84,18 @@ void add_run(const std::string& path, const std::vector<std::string>& runs,
   for (std::size_t c = 0; c < drawn; ++c) {
     const Measured::Samples& y = measured.curves[c];
     const Measured::Samples& x = over_curve ? measured.curves.back() : y;
-    SvgSeries series;
-    series.points = joined(x, over_curve ? x.value : x.time, y);
+    PlotSeries series;
+    series.marks = false;
+    // Both were taken at the same times, unless one of them has rows for a part of them only.
+    for (std::size_t k = 0; k < std::min(x.time.size(), y.time.size()); ++k)
+      if (std::abs(x.time[k] - y.time[k]) <= 1e-9 * std::max(1.0, std::abs(y.time[k]))) {
+        series.x.push_back(over_curve ? x.value[k] : x.time[k]);
+        series.y.push_back(y.value[k]);
+      }
     std::string name = drawn > 1 ? curves[c].name : "";
     if (runs.size() > 1) name = label_of(path, runs) + (name.empty() ? "" : ": " + name);
     series.name = name;
-    if (series.points.empty())
+    if (series.x.empty())
       warn(fmt::format("{}: '{}' has no value there", path, curves[c].name));
     plot.series.push_back(std::move(series));
   }
@@ -123,7 +117,7 @@ int run_plot(const Invocation& invocation) {
   const std::vector<Curve> curves =
       curves_asked_for(invocation, scenario_of(first->genesis(), first->path()));
   const bool over_curve = invocation.has("x");
-  SvgPlot plot;
+  Plot plot;
   plot.title = invocation.has("title") ? invocation.value("title")
                : runs.size() == 1      ? label_of(runs.front(), runs)
                                        : std::string();

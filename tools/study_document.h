@@ -5,7 +5,7 @@
 #include <variant>
 #include <vector>
 
-#include "tools/study_svg.h"
+#include "tools/svg_plot.h"
 
 namespace varve::tools {
 

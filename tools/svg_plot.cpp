@@ -10,197 +10,251 @@
 namespace varve::tools {
 namespace {
 
-constexpr double left = 78, right = 24, top = 40, bottom = 52;  // [px]
-constexpr std::array<const char*, 8> colours{"#1f5fa8", "#c1440e", "#2e7d32", "#7b3fa0",
-                                             "#b8860b", "#00838f", "#ad1457", "#555555"};
+constexpr double axis_length = 430, height = 380, left = 74, top = 34, bottom = 56;
+constexpr std::array<const char*, 10> colours = {"#1b6ca8", "#d1495b", "#2e8b57", "#b8860b",
+                                                 "#6a4c93", "#008b8b", "#8b4513", "#c71585",
+                                                 "#556b2f", "#444444"};
 
-/// One axis: from values to pixels.
-class Axis {
- public:
-  Axis(double low, double high, bool logarithmic, double from, double to)
-      : low_(low), high_(high), logarithmic_(logarithmic), from_(from), to_(to) {
-    if (logarithmic_) {
-      if (!(high_ > low_)) low_ /= 2, high_ *= 2;
-      const double margin = 0.06 * std::log(high_ / low_);
-      low_ *= std::exp(-margin);
-      high_ *= std::exp(margin);
-    } else {
-      if (!(high_ > low_)) {
-        const double half = low_ == 0 ? 1 : 0.5 * std::abs(low_);
-        low_ -= half;
-        high_ += half;
-      }
-      const double margin = 0.04 * (high_ - low_);
-      low_ -= margin;
-      high_ += margin;
+struct Range {
+  double least = std::numeric_limits<double>::infinity(), most = -least;
+  void take(double value) {
+    if (std::isnan(value)) return;
+    least = std::min(least, value);
+    most = std::max(most, value);
+  }
+  void widen() {
+    if (!(least <= most)) least = most = 0;
+    if (least == most) {
+      const double pad = least == 0 ? 1 : 0.1 * std::abs(least);
+      least -= pad;
+      most += pad;
+      return;
     }
+    const double pad = 0.04 * (most - least);
+    least -= pad;
+    most += pad;
   }
-  double at(double value) const {
-    const double part = logarithmic_ ? std::log(value / low_) / std::log(high_ / low_)
-                                     : (value - low_) / (high_ - low_);
-    return from_ + part * (to_ - from_);
-  }
-  std::vector<double> ticks() const { return svg_ticks(low_, high_, logarithmic_); }
-
- private:
-  double low_, high_;
-  bool logarithmic_;
-  double from_, to_;
 };
 
-std::string number(double value) {
-  return std::abs(value) < 1e-12 ? "0" : fmt::format("{:.6g}", value);
+double spread_at(const PlotSeries& series, std::size_t i) {
+  return i < series.spread.size() && !std::isnan(series.spread[i]) ? series.spread[i] : 0;
 }
 
-bool drawable(const SvgPlot& plot, const std::pair<double, double>& point) {
-  return std::isfinite(point.first) && std::isfinite(point.second) &&
-         !(plot.log_x && point.first <= 0) && !(plot.log_y && point.second <= 0);
+bool drawable(const Plot& plot, const PlotSeries& series, std::size_t i) {
+  const double x = series.x[i], y = series.y[i];
+  return std::isfinite(x) && std::isfinite(y) && !(plot.log_x && x <= 0) &&
+         !(plot.log_y && y <= 0);
 }
 
-std::string frame_of(const SvgPlot& plot, const Axis& x, const Axis& y) {
-  std::string out;
-  const double x0 = left, x1 = plot.width - right, y0 = plot.height - bottom, y1 = top;
-  for (const double tick : x.ticks()) {
-    out += fmt::format("<line class=\"grid\" x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1:.1f}\" "
-                       "y2=\"{2:.1f}\"/>\n", x.at(tick), y0, y1);
-    out += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\">{}</text>\n",
-                       x.at(tick), y0 + 17, number(tick));
-  }
-  for (const double tick : y.ticks()) {
-    out += fmt::format("<line class=\"grid\" x1=\"{1:.1f}\" x2=\"{2:.1f}\" y1=\"{0:.1f}\" "
-                       "y2=\"{0:.1f}\"/>\n", y.at(tick), x0, x1);
-    out += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"end\">{}</text>\n", x0 - 7,
-                       y.at(tick) + 4, number(tick));
-  }
-  out += fmt::format("<rect class=\"frame\" x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" "
-                     "height=\"{:.1f}\"/>\n", x0, y1, x1 - x0, y0 - y1);
-  return out;
+std::string text_at(const std::vector<std::string>& texts, std::size_t i) {
+  return i < texts.size() ? texts[i] : std::string();
 }
 
-std::string series_of(const SvgPlot& plot, const SvgSeries& series, const char* colour,
-                      const Axis& x, const Axis& y) {
-  std::string path, marks;
-  bool pen_down = false;
-  for (std::size_t k = 0; k < series.points.size(); ++k) {
-    if (!drawable(plot, series.points[k])) {
-      pen_down = false;
-      continue;
+class Drawing {
+ public:
+  explicit Drawing(const Plot& plot) : plot_(plot) {
+    std::size_t longest = 0;
+    for (const PlotSeries& series : plot.series) longest = std::max(longest, series.name.size());
+    if (longest > 0) right_ = 44 + 6 * static_cast<double>(longest);
+    for (const PlotSeries& series : plot.series)
+      for (std::size_t i = 0; i < series.x.size(); ++i) {
+        if (!drawable(plot, series, i)) continue;
+        const double low = series.y[i] - spread_at(series, i);
+        x_.take(along(series.x[i], plot.log_x));
+        y_.take(along(plot.log_y && low <= 0 ? series.y[i] : low, plot.log_y));
+        y_.take(along(series.y[i] + spread_at(series, i), plot.log_y));
+      }
+    if (!plot.categories.empty()) {
+      x_.least = -0.5;
+      x_.most = static_cast<double>(plot.categories.size()) - 0.5;
+    } else {
+      x_.widen();
     }
-    const double px = x.at(series.points[k].first), py = y.at(series.points[k].second);
-    path += fmt::format("{}{:.1f} {:.1f}", pen_down ? " L " : (path.empty() ? "M " : " M "), px,
-                        py);
-    pen_down = true;
-    const std::string tip = k < series.tips.size() ? xml_text(series.tips[k]) : "";
-    if (series.markers)
-      marks += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3.5\" fill=\"{}\" "
-                           "stroke=\"{}\"><title>{}</title></circle>\n", px, py,
-                           series.hollow ? "white" : colour, colour, tip);
-    if (k < series.labels.size() && !series.labels[k].empty())
-      marks += fmt::format("<text class=\"label\" x=\"{:.1f}\" y=\"{:.1f}\">{}</text>\n", px + 6,
-                           py - 4, xml_text(series.labels[k]));
+    // Zero belongs to the picture where it is near.
+    if (!plot.log_y && y_.least > 0 && y_.least < 0.35 * y_.most) y_.least = 0;
+    y_.widen();
   }
-  std::string out;
-  if (series.line && !path.empty())
-    out = fmt::format("<path d=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.6\"/>\n", path,
-                      colour);
-  return out + marks;
-}
 
-std::string legend_of(const SvgPlot& plot) {
-  std::string out;
-  double y = top + 16;
-  for (std::size_t k = 0; k < plot.series.size(); ++k) {
-    const SvgSeries& series = plot.series[k];
-    if (series.name.empty()) continue;
-    const char* colour = colours[k % colours.size()];
-    const double x = plot.width - right - 12;
-    out += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3.5\" fill=\"{}\" "
-                       "stroke=\"{}\"/>\n", x, y - 4, series.hollow ? "white" : colour, colour);
-    out += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"end\">{}</text>\n", x - 9, y,
-                       xml_text(series.name));
-    y += 16;
+  std::string run() {
+    out_ = fmt::format("<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {} {}\" "
+                       "width=\"{}\" height=\"{}\" font-family=\"sans-serif\" font-size=\"12\" "
+                       "role=\"img\">\n<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n",
+                       width(), height, width(), height);
+    text(left, 20, plot_.title, "start", "font-size=\"14\"");
+    if (plot_.empty()) {
+      text(0.5 * width(), 0.5 * height, "nothing to draw", "middle");
+      return out_ + "</svg>\n";
+    }
+    axes();
+    for (std::size_t i = 0; i < plot_.series.size(); ++i) series(i);
+    legend();
+    return out_ + "</svg>\n";
   }
-  return out;
-}
+
+ private:
+  double width() const { return left + axis_length + right_; }
+  static double along(double value, bool logarithmic) {
+    return logarithmic ? std::log10(value) : value;
+  }
+  double px(double x) const {
+    const double part = (along(x, plot_.log_x) - x_.least) / (x_.most - x_.least);
+    return left + part * axis_length;
+  }
+  double py(double y) const {
+    // The lower end of a bar may lie below what a logarithmic axis has.
+    const double place = plot_.log_y && y <= 0 ? y_.least : along(y, plot_.log_y);
+    return height - bottom - (place - y_.least) / (y_.most - y_.least) * (height - top - bottom);
+  }
+  static std::vector<double> ticks(const Range& range, bool logarithmic, std::size_t count) {
+    return logarithmic ? log_ticks(std::pow(10, range.least), std::pow(10, range.most))
+                       : axis_ticks(range.least, range.most, count);
+  }
+  void text(double x, double y, const std::string& what, const char* anchor,
+            const std::string& more = "") {
+    out_ += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\" fill=\"#222222\" "
+                        "{}>{}</text>\n",
+                        x, y, anchor, more, escape_markup(what));
+  }
+  void line(double x1, double y1, double x2, double y2, const char* colour, double thick) {
+    out_ += fmt::format("<line x1=\"{:.1f}\" y1=\"{:.1f}\" x2=\"{:.1f}\" y2=\"{:.1f}\" "
+                        "stroke=\"{}\" stroke-width=\"{}\"/>\n",
+                        x1, y1, x2, y2, colour, thick);
+  }
+
+  void axes() {
+    const double floor = height - bottom, end = left + axis_length;
+    for (const double tick : ticks(y_, plot_.log_y, 6)) {
+      line(left, py(tick), end, py(tick), "#dddddd", 1);
+      text(left - 6, py(tick) + 4, fmt::format("{:.4g}", tick), "end");
+    }
+    if (plot_.categories.empty()) {
+      for (const double tick : ticks(x_, plot_.log_x, 7)) {
+        line(px(tick), floor, px(tick), floor + 5, "#222222", 1);
+        text(px(tick), floor + 18, fmt::format("{:.4g}", tick), "middle");
+      }
+    } else {
+      const bool many = plot_.categories.size() > 6;
+      for (std::size_t i = 0; i < plot_.categories.size(); ++i) {
+        const double x = px(static_cast<double>(i));
+        text(x, floor + 16, plot_.categories[i], many ? "end" : "middle",
+             many ? fmt::format("font-size=\"10\" transform=\"rotate(-35 {:.1f} {:.1f})\"", x,
+                                floor + 16)
+                  : "");
+      }
+    }
+    line(left, floor, end, floor, "#222222", 1);
+    line(left, top, left, floor, "#222222", 1);
+    text(0.5 * (left + end), height - 10, plot_.x_label, "middle");
+    const double middle = 0.5 * (top + floor);
+    text(16, middle, plot_.y_label, "middle",
+         fmt::format("transform=\"rotate(-90 16 {:.1f})\"", middle));
+  }
+
+  void series(std::size_t index) {
+    const PlotSeries& each = plot_.series[index];
+    const char* colour = colours[index % colours.size()];
+    std::string path, upper, lower;
+    for (std::size_t i = 0; i < each.x.size(); ++i) {
+      if (!drawable(plot_, each, i)) continue;
+      const double x = px(each.x[i]), s = spread_at(each, i);
+      path += fmt::format("{:.1f},{:.1f} ", x, py(each.y[i]));
+      upper += fmt::format("{:.1f},{:.1f} ", x, py(each.y[i] + s));
+      lower = fmt::format("{:.1f},{:.1f} ", x, py(each.y[i] - s)) + lower;
+    }
+    if (each.band && !each.spread.empty())
+      out_ += fmt::format("<polygon points=\"{}{}\" fill=\"{}\" fill-opacity=\"0.18\" "
+                          "stroke=\"none\"/>\n",
+                          upper, lower, colour);
+    if (each.line)
+      out_ += fmt::format("<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" "
+                          "stroke-width=\"1.6\"/>\n",
+                          path, colour);
+    if (!each.band && each.marks) marks(each, colour);
+  }
+
+  void marks(const PlotSeries& each, const char* colour) {
+    for (std::size_t i = 0; i < each.x.size(); ++i) {
+      if (!drawable(plot_, each, i)) continue;
+      const double x = px(each.x[i]), y = py(each.y[i]), s = spread_at(each, i);
+      if (s > 0) line(x, py(each.y[i] - s), x, py(each.y[i] + s), colour, 1.4);
+      const std::string tip = escape_markup(text_at(each.tips, i));
+      out_ += fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3.4\" fill=\"{}\"{}", x, y,
+                          each.hollow ? "#ffffff" : colour,
+                          each.hollow ? fmt::format(" stroke=\"{}\"", colour) : std::string());
+      out_ += tip.empty() ? "/>\n" : fmt::format("><title>{}</title></circle>\n", tip);
+      if (const std::string label = text_at(each.labels, i); !label.empty())
+        text(x + 6, y - 4, label, "start", "font-size=\"10\"");
+    }
+  }
+
+  void legend() {
+    if (right_ <= 20) return;
+    constexpr std::size_t shown = 18;
+    for (std::size_t i = 0; i < std::min(shown, plot_.series.size()); ++i) {
+      const double y = top + 8 + 17 * static_cast<double>(i);
+      line(left + axis_length + 10, y, left + axis_length + 26, y, colours[i % colours.size()], 3);
+      text(left + axis_length + 31, y + 4, plot_.series[i].name, "start", "font-size=\"10\"");
+    }
+  }
+
+  const Plot& plot_;
+  double right_ = 20;  ///< beside the axes: the legend
+  Range x_, y_;
+  std::string out_;
+};
 
 }  // namespace
 
-std::string xml_text(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '&': out += "&amp;"; break;
-      case '<': out += "&lt;"; break;
-      case '>': out += "&gt;"; break;
-      case '"': out += "&quot;"; break;
-      default: out += c;
-    }
-  }
-  return out;
+bool Plot::empty() const {
+  for (const PlotSeries& each : series)
+    for (std::size_t i = 0; i < each.x.size(); ++i)
+      if (drawable(*this, each, i)) return false;
+  return true;
 }
 
-std::vector<double> svg_ticks(double low, double high, bool logarithmic) {
-  std::vector<double> ticks;
-  if (logarithmic) {
-    const int from = static_cast<int>(std::floor(std::log10(low)));
-    const int to = static_cast<int>(std::ceil(std::log10(high)));
-    const bool few = std::log10(high / low) < 3;
-    for (int power = from; power <= to; ++power)
-      for (const int factor : {1, 2, 5}) {
-        const double tick = factor * std::pow(10.0, power);
-        if ((factor == 1 || few) && tick >= low && tick <= high) ticks.push_back(tick);
-      }
-    return ticks;
-  }
-  const double rough = (high - low) / 6;
-  const double power = std::pow(10.0, std::floor(std::log10(rough)));
-  double step = power;
-  for (const double factor : {1.0, 2.0, 5.0, 10.0})
+std::vector<double> axis_ticks(double least, double most, std::size_t count) {
+  const double rough = (most - least) / static_cast<double>(std::max<std::size_t>(1, count));
+  if (!(rough > 0) || !std::isfinite(rough)) return {least};
+  const double power = std::pow(10, std::floor(std::log10(rough)));
+  double step = 10 * power;
+  for (const double factor : {1.0, 2.0, 5.0})
     if (factor * power >= rough) {
       step = factor * power;
       break;
     }
-  for (double k = std::ceil(low / step); k * step <= high; ++k) ticks.push_back(k * step);
+  std::vector<double> ticks;
+  const double first = std::ceil(least / step);
+  for (double k = first; k * step <= most * (1 + 1e-12) && ticks.size() < 4 * count; ++k)
+    ticks.push_back(k == 0 ? 0 : k * step);
   return ticks;
 }
 
-std::string svg_of(const SvgPlot& plot) {
-  double x_low = std::numeric_limits<double>::infinity(), x_high = -x_low;
-  double y_low = x_low, y_high = -x_low;
-  for (const SvgSeries& series : plot.series)
-    for (const auto& point : series.points) {
-      if (!drawable(plot, point)) continue;
-      x_low = std::min(x_low, point.first);
-      x_high = std::max(x_high, point.first);
-      y_low = std::min(y_low, point.second);
-      y_high = std::max(y_high, point.second);
+std::vector<double> log_ticks(double least, double most) {
+  std::vector<double> ticks;
+  const double from = std::floor(std::log10(least)), to = std::ceil(std::log10(most));
+  const bool few = std::log10(most / least) < 3;
+  for (double power = from; power <= to; ++power)
+    for (const double factor : {1.0, 2.0, 5.0}) {
+      const double tick = factor * std::pow(10, power);
+      if ((factor == 1 || few) && tick >= least && tick <= most) ticks.push_back(tick);
     }
-  std::string out = fmt::format(
-      "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0:g} {1:g}\" width=\"{0:g}\" "
-      "height=\"{1:g}\" font-family=\"sans-serif\" font-size=\"12\">\n"
-      "<style>.grid{{stroke:#dddddd}}.frame{{fill:none;stroke:#444444}}"
-      ".label{{font-size:10px;fill:#333333}}</style>\n"
-      "<rect width=\"{0:g}\" height=\"{1:g}\" fill=\"white\"/>\n",
-      plot.width, plot.height);
-  out += fmt::format("<text x=\"{:g}\" y=\"24\" font-size=\"14\" text-anchor=\"middle\">{}"
-                     "</text>\n", plot.width / 2, xml_text(plot.title));
-  if (x_low > x_high) {
-    out += fmt::format("<text x=\"{:g}\" y=\"{:g}\" text-anchor=\"middle\">nothing to draw"
-                       "</text>\n", plot.width / 2, plot.height / 2);
-    return out + "</svg>\n";
-  }
-  const Axis x(x_low, x_high, plot.log_x, left, plot.width - right);
-  const Axis y(y_low, y_high, plot.log_y, plot.height - bottom, top);
-  out += frame_of(plot, x, y);
-  for (std::size_t k = 0; k < plot.series.size(); ++k)
-    out += series_of(plot, plot.series[k], colours[k % colours.size()], x, y);
-  out += legend_of(plot);
-  out += fmt::format("<text x=\"{:g}\" y=\"{:g}\" text-anchor=\"middle\">{}</text>\n",
-                     (left + plot.width - right) / 2, plot.height - 14, xml_text(plot.x_label));
-  out += fmt::format("<text transform=\"translate(18 {:g}) rotate(-90)\" "
-                     "text-anchor=\"middle\">{}</text>\n",
-                     (top + plot.height - bottom) / 2, xml_text(plot.y_label));
-  return out + "</svg>\n";
+  return ticks;
 }
+
+std::string escape_markup(const std::string& text) {
+  std::string out;
+  for (const char c : text) {
+    switch (c) {
+      case '<': out += "&lt;"; break;
+      case '>': out += "&gt;"; break;
+      case '&': out += "&amp;"; break;
+      case '"': out += "&quot;"; break;
+      default: out += static_cast<unsigned char>(c) < 0x20 ? ' ' : c;
+    }
+  }
+  return out;
+}
+
+std::string svg_of(const Plot& plot) { return Drawing(plot).run(); }
 
 }  // namespace varve::tools

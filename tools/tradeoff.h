@@ -180,7 +180,8 @@ struct RungResult {
   std::vector<RungRun> runs;     ///< by seed
   Cost cost;                     ///< mean over seeds
   std::vector<Judged> judged;    ///< by measure
-  std::optional<double> worst;   ///< largest |error| of all measures
+  /// Largest |error| of all measures, each with the standard error of its mean over seeds.
+  std::optional<double> worst;
   bool reference = false, front = false;
 };
 

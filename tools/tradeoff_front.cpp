@@ -142,7 +142,10 @@ std::vector<std::string> judge(std::vector<TradeMeasure>& measures, std::vector<
         rung.judged.push_back(
             judged_of(measure, rung, mean_of(rungs[reference], measure.name)));
         const std::optional<double>& error = rung.judged.back().error;
-        if (error) worst = std::max(worst, std::abs(*error));
+        // What few seeds leave open counts against a rung.
+        const double open =
+            rung.judged.back().spread / std::sqrt(static_cast<double>(rung.runs.size()));
+        if (error) worst = std::max(worst, std::abs(*error) + (i == reference ? 0 : open));
         whole = whole && error && !std::isnan(*error);
       }
       if (whole) rung.worst = worst;

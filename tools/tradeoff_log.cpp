@@ -1,5 +1,6 @@
 // The price of recording: the same states written in every tier and cadence, then sought at random.
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <ctime>
@@ -197,22 +198,24 @@ std::string csv_of(const std::vector<Recording>& all) {
 }
 
 std::string svg_of(const std::string& file, const std::vector<Recording>& all) {
-  SvgPlot plot;
+  Plot plot;
   plot.title = file + ": bytes against seek";
   plot.x_label = "bytes per step";
   plot.y_label = "CPU seconds to seek";
   plot.log_x = plot.log_y = true;
-  SvgSeries tiers[] = {{"deltas", {}, {}, false, true, false},
-                       {"every k", {}, {}, false, true, false},
-                       {"digests", {}, {}, false, true, false}};
+  plot.series.resize(3);
+  for (std::size_t k = 0; k < 3; ++k) {
+    plot.series[k].name = std::array{"deltas", "every k", "digests"}[k];
+    plot.series[k].line = false;
+  }
   for (const Recording& each : all) {
-    SvgSeries& series =
-        tiers[each.tier == core::RecordTier::digests ? 2 : (each.every > 1 ? 1 : 0)];
-    series.points.emplace_back(each.bytes_per_step, each.seek_cpu_s);
+    PlotSeries& series =
+        plot.series[each.tier == core::RecordTier::digests ? 2 : (each.every > 1 ? 1 : 0)];
+    series.x.push_back(each.bytes_per_step);
+    series.y.push_back(each.seek_cpu_s);
     series.labels.push_back(each.every > 1 ? std::to_string(each.every)
                                            : std::to_string(each.keyframe_steps));
   }
-  plot.series.assign(std::begin(tiers), std::end(tiers));
   return svg_of(plot);
 }
 

@@ -171,7 +171,8 @@ std::string text_of(const TradeReport& report) {
                                 report.scene.until, report.threads,
                                 report.threads == 1 ? "" : "s",
                                 report.seeds > 1 ? fmt::format(", {} seeds each (error ~ standard "
-                                                               "deviation over seeds)",
+                                                               "deviation over seeds; worst: with "
+                                                               "the mean's standard error)",
                                                                report.seeds)
                                                  : std::string(),
                                 reference_text(report));
@@ -197,6 +198,10 @@ std::string text_of(const TradeReport& report) {
   }
   out += aligned(rows) + notes + "* on the front: nothing else is as cheap and as accurate\n" +
          doubt_of(report);
+  const core::Scenario& base = report.scene.base;
+  if (report.seeds == 1 && (base.grains.jitter > 0 || base.fluid.jitter > 0 ||
+                            base.grains.arrangement == core::Arrangement::random))
+    out += "one seed: a small error may be luck; --seeds N tells\n";
   for (const Recommendation& each : report.recommended) {
     if (!each.rung) {
       out += fmt::format("within {}: no rung\n", percent(each.within, false));
@@ -271,13 +276,17 @@ std::string csv_of(const TradeReport& report) {
 }
 
 std::string svg_of(const TradeReport& report) {
-  SvgPlot plot;
+  Plot plot;
   plot.title = fmt::format("{} to {:g} s: cost against error", report.scene.file,
                            report.scene.until);
   plot.x_label = "CPU seconds";
   plot.y_label = "worst relative error";
   plot.log_x = plot.log_y = true;
-  SvgSeries front{"front", {}, {}, true, true, false}, others{"beaten", {}, {}, false, true, true};
+  PlotSeries front, others;
+  front.name = "front";
+  others.name = "beaten";
+  others.line = false;
+  others.hollow = true;
   std::vector<const RungResult*> order;
   for (const RungResult& rung : report.rungs)
     if (rung.worst) order.push_back(&rung);
@@ -285,8 +294,9 @@ std::string svg_of(const TradeReport& report) {
     return a->cost.cpu_s < b->cost.cpu_s;
   });
   for (const RungResult* rung : order) {
-    SvgSeries& series = rung->front ? front : others;
-    series.points.emplace_back(rung->cost.cpu_s, *rung->worst);
+    PlotSeries& series = rung->front ? front : others;
+    series.x.push_back(rung->cost.cpu_s);
+    series.y.push_back(*rung->worst);
     // Beaten ones lie close together: only levels are named among them.
     series.labels.push_back(rung->front || rung->rung.knob == "level" ? rung->rung.name : "");
     series.tips.push_back(rung->rung.name);

@@ -75,7 +75,7 @@ TEST(Judge, ErrorsAreRelativeToTheReferenceWithItsSpread) {
   EXPECT_NEAR(*rungs[0].judged[0].value, 1.2, 1e-12);
   EXPECT_NEAR(*rungs[0].judged[0].error, -0.4, 1e-12);
   EXPECT_NEAR(rungs[0].judged[0].spread, std::sqrt(0.02) / 2, 1e-12);
-  EXPECT_NEAR(*rungs[0].worst, 0.4, 1e-12);
+  EXPECT_NEAR(*rungs[0].worst, 0.4 + std::sqrt(0.01) / 2, 1e-12);
   EXPECT_EQ(*rungs[1].judged[0].error, 0);
   EXPECT_TRUE(rungs[0].front && rungs[1].front && rungs[1].reference);
 }
@@ -132,28 +132,35 @@ TEST(Share, IsReadWithOrWithoutPercent) {
 // ---- plots ----
 
 TEST(SvgPlot, IsWellFormedAndHoldsItsPoints) {
-  SvgPlot plot;
+  Plot plot;
   plot.title = "a < b & \"c\"";
   plot.log_x = plot.log_y = true;
-  plot.series = {{"front", {{1, 0.1}, {10, 0.01}, {0, 1}, {1, none}}, {"x<y"}, true, true, false}};
+  PlotSeries series;
+  series.name = "front";
+  series.x = {1, 10, 0, 1};
+  series.y = {0.1, 0.01, 1, none};
+  series.labels = {"x<y"};
+  series.tips = {"first", "second"};
+  plot.series = {series};
   const std::string svg = svg_of(plot);
   EXPECT_EQ(broken_xml(svg), "");
   EXPECT_THAT(svg, HasSubstr("a &lt; b &amp; &quot;c&quot;"));
   EXPECT_THAT(svg, HasSubstr("x&lt;y"));
+  EXPECT_THAT(svg, HasSubstr("<title>second</title>"));
   EXPECT_THAT(svg, Not(HasSubstr("nan")));
-  // Two points and the legend's mark: what can't be drawn is left out.
+  // Two points: what can't be drawn is left out.
   std::size_t circles = 0;
   for (std::size_t at = 0; (at = svg.find("<circle", at)) != std::string::npos; ++at) ++circles;
-  EXPECT_EQ(circles, 3u);
-  plot.series.clear();
+  EXPECT_EQ(circles, 2u);
+  plot.series.front().x = {0, -1, 0, -1};
   EXPECT_THAT(svg_of(plot), HasSubstr("nothing to draw"));
   EXPECT_NE(broken_xml("<svg><g></svg>"), "");
 }
 
 TEST(SvgPlot, TicksAreRoundAndInside) {
-  EXPECT_THAT(svg_ticks(0, 10, false), ElementsAre(0, 2, 4, 6, 8, 10));
-  EXPECT_THAT(svg_ticks(0.9, 21, true), ElementsAre(1, 2, 5, 10, 20));
-  EXPECT_THAT(svg_ticks(1, 1e5, true), ElementsAre(1, 10, 100, 1000, 1e4, 1e5));
+  EXPECT_THAT(axis_ticks(0, 10, 6), ElementsAre(0, 2, 4, 6, 8, 10));
+  EXPECT_THAT(log_ticks(0.9, 21), ElementsAre(1, 2, 5, 10, 20));
+  EXPECT_THAT(log_ticks(1, 1e5), ElementsAre(1, 10, 100, 1000, 1e4, 1e5));
 }
 
 // ---- ladders ----
