@@ -35,7 +35,10 @@ void run(io::MemoryFileSystem& files, unsigned how) {
   const auto b = io::LogReader::open("b", &files);
   if (!stores_every_state(*a) || !stores_every_state(*b)) return;
   const tools::DiffReport one = compare(*a, *b, how);
-  const tools::DiffReport other = compare(*b, *a, how);
+  // Readers of their own, as the verb has: one that has met damage inside a record counts the step
+  // as lost from then on.
+  const auto a_again = io::LogReader::open("a", &files), b_again = io::LogReader::open("b", &files);
+  const tools::DiffReport other = compare(*b_again, *a_again, how);
   fuzz::require(one.verdict == other.verdict, "a verdict does not hang on the order of the files");
   if (one.verdict == tools::Verdict::different && how == 0) {
     fuzz::require(one.first && other.first && one.first->step == other.first->step,

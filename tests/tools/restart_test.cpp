@@ -111,8 +111,12 @@ TEST_P(RestartOf, EveryStepIsARestartPoint) {
     rebuilds += again->simulation().counters().list_rebuilds;
     ++restarts;
   }
-  if (scene.contacts) EXPECT_GT(contact_steps, restarts / 4) << "not rich in contacts";
-  if (scene.fluid) EXPECT_GT(rebuilds, restarts) << "no continuation went through a rebuild";
+  if (scene.contacts) {
+    EXPECT_GT(contact_steps, restarts / 4) << "not rich in contacts";
+  }
+  if (scene.fluid) {
+    EXPECT_GT(rebuilds, restarts) << "no continuation went through a rebuild";
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Scenes, RestartOf, ::testing::ValuesIn(restart_scenes()),
