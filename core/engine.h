@@ -116,7 +116,8 @@ class Engine final : public Simulation {
   static ChangeOptions scheduled_options(const ScheduledChange& scheduled);
   Vec<double, D> walls_on_fluid(const FluidState<D, P>& at) const;
   StepLedger ledger_of(const FluidState<D, P>& at, const Vec<double, D>& fluid_change,
-                       const Vec<double, D>& grain_change) const;
+                       const Vec<double, D>& grain_change,
+                       const Vec<double, D>& wall_impulse) const;
   std::vector<Vec<double, D>> velocities_ahead() const;
   double internal_energy(double density) const;
   template <class SmoothingKernel>
@@ -152,6 +153,7 @@ class Engine final : public Simulation {
   FluidLists<D, Position> lists_;
   CouplingStage<D, P> coupling_;
   Contacts<D, P> contacts_;
+  Vec<double, D> evaluated_wall_impulse_ = Vec<double, D>::Zero();  // [N s] of evaluate()'s step
   DragLaw<D> drag_law_;
   std::vector<Wall> walls_;
   RunOptions options_;

@@ -338,7 +338,7 @@ StepBalance Engine<D, P>::balance() const {
   for (std::size_t i = 0; i < state_.grains.size(); ++i)
     grain_change += c_.species[state_.grains.species[i]].mass *
                     (doubles<D>(next_.grains.velocity[i]) - doubles<D>(state_.grains.velocity[i]));
-  sum.ledger = ledger_of(state_.fluid, fluid_change, grain_change);
+  sum.ledger = ledger_of(state_.fluid, fluid_change, grain_change, evaluated_wall_impulse_);
   return sum;
 }
 

@@ -120,13 +120,14 @@ StepLedger Engine<D, P>::ledger() const {
                  next_.grains.velocity[i].template cast<double>();
     grain_change += c_.species[state_.grains.species[i]].mass * dv;
   }
-  return ledger_of(next_.fluid, fluid_change, grain_change);
+  return ledger_of(next_.fluid, fluid_change, grain_change, contacts_.wall_impulse());
 }
 
 /// The sums of a step whose forces were evaluated at `at`, with the changes of momentum given.
 template <int D, class P>
 StepLedger Engine<D, P>::ledger_of(const FluidState<D, P>& at, const Vec<double, D>& fluid_change,
-                                   const Vec<double, D>& grain_change) const {
+                                   const Vec<double, D>& grain_change,
+                                   const Vec<double, D>& wall_impulse) const {
   using V = Vec<double, D>;
   V fluid_external = V::Zero(), reactions = V::Zero();
   V grain_external = V::Zero(), from_fluid = V::Zero();
@@ -155,7 +156,7 @@ StepLedger Engine<D, P>::ledger_of(const FluidState<D, P>& at, const Vec<double,
   // Part of the reactions near a wall is the wall's: it mirrors the grains.
   if (c_.conjugate_pressure) reactions -= coupling_.walls_on_fluid();
   V on_grains = V::Zero();
-  if (scenario_.has_grains() && !c_.frozen) on_grains = contacts_.wall_impulse() / c_.dt;
+  if (scenario_.has_grains() && !c_.frozen) on_grains = wall_impulse / c_.dt;
   using engine_detail::listed;
   return {listed<D>(fluid_change),   listed<D>(grain_change),   listed<D>(walls_on_fluid(at)),
           listed<D>(on_grains),      listed<D>(fluid_external), listed<D>(grain_external),

@@ -72,6 +72,7 @@ void Engine<D, P>::evaluate() {
     contacts_ = kept;
     throw;
   }
+  evaluated_wall_impulse_ = contacts_.wall_impulse();
   contacts_ = kept;
 }
 

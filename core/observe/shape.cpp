@@ -132,7 +132,7 @@ double compactness(const GrainView& grains, const Domain& walls) {
   constexpr double pi = 3.14159265358979323846;
   const double section = walls.shape == Shape::pipe ? 0.25 * pi * walls.width * walls.width
                                                     : walls.width * walls.depth;
-  return shadow_area(grains, least / 16) / section;
+  return shadow_area(grains, least / 32) / section;
 }
 
 std::vector<double> wall_distances(const GrainView& grains, const Domain& walls) {

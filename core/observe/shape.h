@@ -34,7 +34,7 @@ RowShape cluster_shape(const Scenario& scenario, const GrainView& grains,
 
 /// Part [-] of the cross-section of the pipe that lies in the grains' shadow along y: in 2D the
 /// union of their extents along x over the width. In 3D the shadow is taken on a lattice of a
-/// sixteenth of the least diameter.
+/// thirty-second of the least diameter.
 double compactness(const GrainView& grains, const Domain& walls);
 
 /// [m] From each grain's centre to the nearest side wall (x, in 3D also z; a pipe's curved wall).
