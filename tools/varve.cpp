@@ -46,7 +46,7 @@ const std::vector<Group>& groups() {
       {"look",
        {{"analyze", "settling velocity, porosity, contacts, energy from a log"},
         {"export", "tables and particle files for other programs"},
-        {"plot", "curves as SVG or PNG"},
+        {"plot", "curves as SVG"},
         {"view", "one page of HTML with a time slider"}}},
       {"study",
        {{"study", "many forks with varied keys"},
