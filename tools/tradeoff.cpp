@@ -247,7 +247,8 @@ class Tradeoff {
         const core::Scenario scenario = scenario_of_seed(rung.rung, k, settings);
         try {
           rung.runs.push_back(
-              run_rung(report_.scene, settings, scenario, report_.measures, how_));
+              run_rung(report_.scene, settings, scenario, report_.measures, how_, signals_));
+          if (signals_.received() != 0) throw Exit{exit_stopped};
         } catch (const Exit& stopped) {
           if (stopped.code == exit_stopped)
             note(invocation_.globals,
@@ -297,6 +298,7 @@ class Tradeoff {
   const Invocation& invocation_;
   TradeReport report_;
   RunSettings how_;
+  StopSignals signals_;
 };
 
 int tradeoff(const Invocation& invocation) {

@@ -17,6 +17,7 @@
 #include "tools/analysis.h"
 #include "tools/cli.h"
 #include "tools/scenario_file.h"
+#include "tools/signals.h"
 
 namespace varve::tools {
 
@@ -152,10 +153,11 @@ struct RunSettings {
 };
 
 /// Runs the scene so (a child), measures it and stores the result; takes it from the folder where
-/// it is there. Throws Exit{75} where a signal asks to stop.
+/// it is there. Throws Exit{75} where a signal asks to stop: `signals` live as long as the ladder,
+/// so that one between two runs is not missed.
 RungRun run_rung(const TradeScene& scene, const std::vector<std::string>& settings,
                  const core::Scenario& resolved, const std::vector<TradeMeasure>& measures,
-                 const RunSettings& how);
+                 const RunSettings& how, const StopSignals& signals);
 /// Cost of the run that run_rung() would find; nothing where it would run it.
 std::optional<Cost> finished_cost(const core::Scenario& resolved,
                                   const std::vector<TradeMeasure>& measures,

@@ -201,10 +201,11 @@ std::optional<Cost> finished_cost(const core::Scenario& resolved,
 
 RungRun run_rung(const TradeScene& scene, const std::vector<std::string>& settings,
                  const core::Scenario& resolved, const std::vector<TradeMeasure>& measures,
-                 const RunSettings& how) {
+                 const RunSettings& how, const StopSignals& signals) {
   const std::string key = content_key(resolved, measures, how);
   const std::string path = result_path(how.folder, key);
   if (auto found = stored(path)) return *found;
+  if (signals.received() != 0) throw Exit{exit_stopped};
   std::error_code ignored;
   fs::create_directories(fs::path(path).parent_path(), ignored);
   const std::string stem = (fs::path(path).parent_path() / key).string();
@@ -223,7 +224,6 @@ RungRun run_rung(const TradeScene& scene, const std::vector<std::string>& settin
     for (const std::string& file : {output, errors}) fs::remove(file, ignored);
     if (!how.keep_logs) fs::remove(log, ignored);
   };
-  const StopSignals signals;
   RungRun run;
   try {
     const Child child = run_child(words, output, errors, signals);
@@ -241,8 +241,9 @@ RungRun run_rung(const TradeScene& scene, const std::vector<std::string>& settin
     if (run.code == exit_ok) measure(log, resolved, scene.until, measures, run);
     if (signals.received() != 0) throw Exit{exit_stopped};
   } catch (...) {
+    // A child that was told to stop as it started leaves its lock and an unfinished log, too.
+    for (const char* left : {"", ".lock", ".new"}) fs::remove(log + left, ignored);
     tidy();
-    fs::remove(log, ignored);
     throw;
   }
   tidy();
