@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include "tests/tools/verbs.h"
@@ -83,6 +84,31 @@ TEST(StudyFiles, AllOfThemPlan) {
   }
 }
 
+std::string text_of(const fs::path& file) {
+  std::ifstream in(file);
+  return std::string(std::istreambuf_iterator<char>(in), {});
+}
+
+/// Quantitative claims of the study are numbered 1 to 51; some are held in several parts.
+TEST(StudyFiles, EveryClaimOfTheStudyIsThereAndInTheReport) {
+  const std::string study = text_of(study_folder() / "figures.study"),
+                    report = text_of(study_folder() / "REPORT.md");
+  for (int number = 1; number <= 51; ++number)
+    EXPECT_THAT(study, testing::HasSubstr(fmt::format("[claim.Q{}]", number)));
+  std::size_t claims = 0;
+  for (std::size_t at = study.find("\n[claim."); at != std::string::npos;
+       at = study.find("\n[claim.", at + 1)) {
+    const std::size_t begin = at + 8;
+    std::string id = study.substr(begin, study.find(']', begin) - begin);
+    for (std::size_t i = 0; (i = id.find('_', i)) != std::string::npos; i += 2) id.insert(i, "\\");
+    EXPECT_THAT(report, testing::HasSubstr(fmt::format("\n| {} |", id)))
+        << "the report is older than figures.study";
+    ++claims;
+  }
+  EXPECT_GE(claims, 51u);
+  EXPECT_THAT(report, testing::Not(testing::HasSubstr("| **not run** |")));
+}
+
 /// Rows of a table without quoted cells, by the names in its first line.
 std::vector<std::map<std::string, std::string>> rows_of(const fs::path& file) {
   std::ifstream in(file);
@@ -154,13 +180,10 @@ TEST(StudyFiles, TheQuickPartOfTheFiguresRuns) {
   EXPECT_EQ(measured(rows, "packing_8x4", "speed").size(), 1u);
 
   // What is done is not done again, and the table is the same to the byte.
-  const auto text_of = [&] {
-    std::ifstream in(fs::path(folder / "results") / "results.csv");
-    return std::string(std::istreambuf_iterator<char>(in), {});
-  };
-  const std::string first = text_of();
+  const fs::path table = fs::path(folder / "results") / "results.csv";
+  const std::string first = text_of(table);
   run("run");
-  EXPECT_EQ(text_of(), first);
+  EXPECT_EQ(text_of(table), first);
 }
 
 }  // namespace
