@@ -396,16 +396,23 @@ void StudyReader::take_measure(const Section& section) {
     }
   }
   each.measure.name = section.name;
-  if (!value) {
-    found_.push_back(at_key(section.place, fmt::format("measure '{}' has no value", section.name)));
-  } else {
-    try {
-      check_point(each.measure.expression, each.measure.at_point);
-    } catch (const ExpressionError& error) {
-      found_.push_back(misplaced(value->place, "value", error));
-    }
-  }
+  check_value(section, "measure", value, each.measure.expression, each.measure.at_point);
   study_.measures.push_back(std::move(each));
+}
+
+/// That there is an expression, and a point where its table needs one.
+void StudyReader::check_value(const Section& section, std::string_view kind, const Entry* value,
+                              const Expression& expression, std::span<const double> at_point) {
+  if (!value) {
+    found_.push_back(
+        at_key(section.place, fmt::format("{} '{}' has no value", kind, section.name)));
+    return;
+  }
+  try {
+    check_point(expression, at_point);
+  } catch (const ExpressionError& error) {
+    found_.push_back(misplaced(value->place, "value", error));
+  }
 }
 
 void StudyReader::take_curve(const Section& section) {
@@ -443,15 +450,7 @@ void StudyReader::take_curve(const Section& section) {
     }
   }
   each.curve.name = section.name;
-  if (!value) {
-    found_.push_back(at_key(section.place, fmt::format("curve '{}' has no value", section.name)));
-  } else {
-    try {
-      check_point(each.curve.expression, each.curve.at_point);
-    } catch (const ExpressionError& error) {
-      found_.push_back(misplaced(value->place, "value", error));
-    }
-  }
+  check_value(section, "curve", value, each.curve.expression, each.curve.at_point);
   study_.curves.push_back(std::move(each));
 }
 

@@ -1,6 +1,7 @@
 // One study file's sections into the structures of study_file.h.
 #pragma once
 
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -43,6 +44,8 @@ class StudyReader {
   void finish_case(StudyCase& each);
   void take_measure(const Section& section);
   void take_curve(const Section& section);
+  void check_value(const Section& section, std::string_view kind, const Entry* value,
+                   const Expression& expression, std::span<const double> at_point);
   void take_figure(const Section& section);
   void take_claim(const Section& section);
   void finish_claim(StudyClaim& claim);

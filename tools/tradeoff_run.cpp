@@ -10,14 +10,11 @@
 #include <sstream>
 #include <thread>
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 #include <signal.h>
-#include <spawn.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
-#include <unistd.h>
 
 #include "core/criteria.h"
 #include "core/parameters.h"
@@ -26,6 +23,7 @@
 #include "tools/probe.h"
 #include "tools/recording.h"
 #include "tools/signals.h"
+#include "tools/subprocess.h"
 #include "tools/tradeoff.h"
 
 namespace varve::tools {
@@ -83,22 +81,10 @@ struct Child {
 /// Runs the child to its end, or to a signal of ours, which it gets too.
 Child run_child(const std::vector<std::string>& words, const std::string& output,
                 const std::string& errors, const StopSignals& signals) {
-  std::vector<char*> argv;
-  for (const std::string& word : words) argv.push_back(const_cast<char*>(word.c_str()));
-  argv.push_back(nullptr);
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, output.c_str(),
-                                   O_WRONLY | O_CREAT | O_TRUNC, 0600);
-  posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, errors.c_str(),
-                                   O_WRONLY | O_CREAT | O_TRUNC, 0600);
-  pid_t pid = 0;
   const auto began = std::chrono::steady_clock::now();
-  const int failed = posix_spawn(&pid, argv[0], &actions, nullptr, argv.data(), environ);
-  posix_spawn_file_actions_destroy(&actions);
-  if (failed != 0)
-    throw ToolError(exit_internal, fmt::format("{}: {}", words[0], std::strerror(failed)));
+  const int pid = start_program(words, output, errors);
+  if (pid < 0)
+    throw ToolError(exit_internal, fmt::format("{}: {}", words[0], std::strerror(-pid)));
   int status = 0;
   rusage used{};
   bool told = false;
