@@ -170,7 +170,8 @@ void Contacts<D, P>::build_list(const Step& step, const GrainState<D, P>& grains
   for (const ContactPair& pair : c.pairs) reach = std::max(reach, pair.sight + skin);
   const std::span<const Vec<Position, D>> points(grains.position);
   cells_.build(points, reach, c.period);
-  find_candidates<D, Position>(points, cells_, reach, c.period, true, step.workers, parts_, rows_);
+  find_candidates<D, Position>(points, cells_, reach, c.period, true, step.workers, set_, parts_,
+                               rows_);
   const auto species = static_cast<std::uint32_t>(c.species.size());
   list_.first.clear();
   list_.second.clear();

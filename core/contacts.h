@@ -55,7 +55,7 @@ class Contacts {
   using Position = typename P::Position;
 
   explicit Contacts(InstructionSet set = best_instruction_set())
-      : sweeps_(contact_sweeps<D, P>(set)) {}
+      : set_(set), sweeps_(contact_sweeps<D, P>(set)) {}
 
   /// Forgets the candidate list, as after a change of the state from outside.
   void reset();
@@ -180,6 +180,7 @@ class Contacts {
   bool is_wall(std::size_t t) const { return (touches_.pairing[t] & wall_bit) != 0; }
   std::uint8_t& known(std::uint32_t candidate);
 
+  InstructionSet set_;
   ContactSweeps<D, P> sweeps_;
   Candidates list_;
   std::vector<Vec<Position, D>> listed_at_;

@@ -60,6 +60,8 @@ class CouplingStage {
   using Real = typename P::Real;
   using Position = typename P::Position;
 
+  explicit CouplingStage(InstructionSet set = best_instruction_set()) : set_(set) {}
+
   /// True if a grain or a fluid particle may have come within 2 hc of another that its list lacks.
   bool stale(const Constants<D>& c, const State<D, P>& state, double skin) const;
   /// Candidates within `skin` beyond the support, by positions as they are now; `walls` mirror
@@ -117,6 +119,7 @@ class CouplingStage {
   std::uint64_t weak_grains() const { return weak_; }
 
  private:
+  InstructionSet set_;
   struct Near {
     std::uint32_t grain, slot;
   };

@@ -62,6 +62,7 @@ class Engine final : public Simulation {
   struct Work {
     std::vector<Real> porosity, floored_porosity, volume_before, density_before, volume, pressure;
     std::vector<Real> push;
+    std::vector<PairRecord<Real>> records;
     std::vector<Vec<Real, D>> stress_force, viscous_force;
     std::vector<Vec<Position, D>> wall_position;
     std::vector<Vec<Real, D>> wall_own_velocity, wall_velocity;
@@ -88,6 +89,8 @@ class Engine final : public Simulation {
   void find_porosity();
   void prepare_fluid();
   void find_density_and_pressure();
+  void fill_records();
+  void update_records();
   void find_wall_values();
   void find_stresses();
   void add_artificial_viscosity();
@@ -109,6 +112,7 @@ class Engine final : public Simulation {
   bool fluid_is_good(std::size_t a) const;
   [[noreturn]] void report_fluid(std::size_t a) const;
   void wrap(Vec<Position, D>& x) const;
+  bool clear_of_walls(const Vec<Position, D>& x) const;
   Vec<double, D> wall_repulsion(const Vec<Position, D>& x) const;
   double density_deviation(std::size_t a) const;
   double beyond_walls(const Vec<Position, D>& x) const;
@@ -156,6 +160,7 @@ class Engine final : public Simulation {
   Vec<double, D> evaluated_wall_impulse_ = Vec<double, D>::Zero();  // [N s] of evaluate()'s step
   DragLaw<D> drag_law_;
   std::vector<Wall> walls_;
+  Box<D> clear_;  // of all walls
   RunOptions options_;
 
   StageDigests stage_digests_;

@@ -17,6 +17,8 @@ Engine<D, P>::Engine(const Scenario& scenario, State<D, P> state, const RunOptio
                            ? best_instruction_set()
                            : std::min(best_instruction_set(),
                                       static_cast<InstructionSet>(options.instruction_set))),
+      lists_(instruction_set_),
+      coupling_(instruction_set_),
       contacts_(instruction_set_),
       options_(options) {
   require_exact_arithmetic(workers_);
@@ -31,6 +33,7 @@ template <int D, class P>
 void Engine<D, P>::adopt_scenario() {
   c_ = constants_of<D>(scenario_);
   walls_ = domain_walls(scenario_);
+  clear_ = core::clear_of_walls<D>(walls_);
   if (scenario_.has_fluid()) {
     build_walls();
     sweeps_ = pair_sweeps<D, P>(scenario_.fluid.kernel, c_.period.any(), c_.conjugate_pressure,

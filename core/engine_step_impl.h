@@ -145,8 +145,7 @@ SweepData<D, P> Engine<D, P>::sweep_data() {
   s.mass = state_.fluid.mass.data();
   s.superficial_density = state_.fluid.superficial_density.data();
   s.porosity = two_way() ? work_.floored_porosity.data() : nullptr;
-  s.volume_before = work_.volume_before.data();
-  s.density_before = work_.density_before.data();
+  s.records = work_.records.data();
   s.fluid = lists_.fluid();
   s.walls = lists_.walls();
   s.of_walls = lists_.of_walls();
@@ -185,8 +184,42 @@ SweepData<D, P> Engine<D, P>::sweep_data() {
   return s;
 }
 
+/// What the density sweep asks of particles.
+template <int D, class P>
+void Engine<D, P>::fill_records() {
+  work_.records.resize(state_.fluid.size());
+  workers_.run(state_.fluid.size(), engine_detail::cheap_items,
+               [&](std::size_t begin, std::size_t end, unsigned) {
+                 for (std::size_t a = begin; a < end; ++a) {
+                   Real* const number = work_.records[a].number;
+                   for (int k = 0; k < D; ++k) {
+                     if constexpr (record_velocity<D, P> > 0)
+                       number[k] = state_.fluid.position[a][k];
+                     number[record_velocity<D, P> + static_cast<std::size_t>(k)] =
+                         state_.fluid.velocity[a][k];
+                   }
+                   number[record_first<D, P>] = work_.density_before[a];
+                   number[record_first<D, P> + 1] = work_.volume_before[a];
+                 }
+               });
+}
+
+/// What the stress sweep asks of them in place of density and volume before the step.
+template <int D, class P>
+void Engine<D, P>::update_records() {
+  workers_.run(state_.fluid.size(), engine_detail::cheap_items,
+               [&](std::size_t begin, std::size_t end, unsigned) {
+                 for (std::size_t a = begin; a < end; ++a) {
+                   Real* const number = work_.records[a].number;
+                   number[record_first<D, P>] = work_.push[a];
+                   number[record_first<D, P> + 1] = work_.volume[a];
+                 }
+               });
+}
+
 template <int D, class P>
 void Engine<D, P>::find_density_and_pressure() {
+  fill_records();
   const SweepData<D, P> data = sweep_data();
   workers_.run((data.count + lanes - 1) / lanes, 4,
                [&](std::size_t begin, std::size_t end, unsigned) {
@@ -212,6 +245,7 @@ void Engine<D, P>::find_wall_values() {
 
 template <int D, class P>
 void Engine<D, P>::find_stresses() {
+  update_records();
   const SweepData<D, P> data = sweep_data();
   workers_.run((data.count + lanes - 1) / lanes, 4,
                [&](std::size_t begin, std::size_t end, unsigned) {
@@ -384,6 +418,17 @@ std::size_t Engine<D, P>::move_fluid_part(std::size_t begin, std::size_t end) {
   return first_bad;
 }
 
+/// True where no wall needs to be asked: nearly always.
+template <int D, class P>
+bool Engine<D, P>::clear_of_walls(const Vec<Position, D>& x) const {
+  bool clear = true;
+  for (int k = 0; k < D; ++k) {
+    const auto along = static_cast<double>(x[k]);
+    clear = clear && along >= clear_.lower[k] && along <= clear_.upper[k];
+  }
+  return clear;
+}
+
 /// Acceleration [m/s2] of fluid beyond a wall, back: 0.4 (c0/dx)^2 times its distance, which stops
 /// 0.6 c0 before the guard's dx. Dummies alone hold fluid back by its pressure, and where that is
 /// not above the mean, between a grain and a wall, particles creep through: diffusion evens out the
@@ -392,6 +437,7 @@ std::size_t Engine<D, P>::move_fluid_part(std::size_t begin, std::size_t end) {
 template <int D, class P>
 Vec<double, D> Engine<D, P>::wall_repulsion(const Vec<Position, D>& x) const {
   Vec<double, D> sum = Vec<double, D>::Zero();
+  if (clear_of_walls(x)) return sum;
   const Vec<double, D> place = x.template cast<double>();
   for (const Wall& wall : walls_) {
     const double inside = distance_inside<D>(wall, place);
@@ -442,7 +488,8 @@ bool Engine<D, P>::fluid_is_good(std::size_t a) const {
   // Written so that a NaN fails too.
   return speed2 <= limit * limit && std::isfinite(place) &&
          std::abs(density_deviation(a)) <= scenario_.guards.density_deviation &&
-         !(beyond_walls(next_.fluid.position[a]) > c_.spacing);
+         (clear_of_walls(next_.fluid.position[a]) ||
+          !(beyond_walls(next_.fluid.position[a]) > c_.spacing));
 }
 
 template <int D, class P>

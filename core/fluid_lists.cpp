@@ -35,7 +35,8 @@ void FluidLists<D, Position>::rebuild(std::span<const Vec<Position, D>> fluid,
   const double radius = support + skin;
   const auto find = [&](std::span<const Vec<Position, D>> from,
                         const CellGrid<D, Position>& cells, bool same, Rows& rows) {
-    find_candidates<D, Position>(from, cells, radius, period, same, workers, parts_, rows);
+    find_candidates<D, Position>(from, cells, radius, period, same, workers, set_, parts_,
+                                 rows);
   };
   fluid_cells_.build(fluid, radius, period);
   find(fluid, fluid_cells_, true, rows_);

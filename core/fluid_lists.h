@@ -12,6 +12,8 @@ namespace varve::core {
 template <int D, class Position>
 class FluidLists {
  public:
+  explicit FluidLists(InstructionSet set = best_instruction_set()) : set_(set) {}
+
   /// True if a point may have come within `support` of another that its list lacks.
   bool stale(std::span<const Vec<Position, D>> fluid, double skin, Workers& workers) const;
   void rebuild(std::span<const Vec<Position, D>> fluid, std::span<const Vec<Position, D>> walls,
@@ -25,6 +27,7 @@ class FluidLists {
   std::span<const std::int32_t> fluid_near_wall(std::size_t w) const { return wall_rows_.of(w); }
 
  private:
+  InstructionSet set_;
   GroupedStorage fluid_, walls_, of_walls_;
   Rows wall_rows_, rows_;
   RowParts parts_;

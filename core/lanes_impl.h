@@ -44,6 +44,41 @@ inline __attribute__((always_inline)) Lane<T> gather(const T* data, const std::i
   return value;
 }
 
+/// Entries of `record_length`-component records at the lanes' indices, all components at once.
+template <class T>
+inline __attribute__((always_inline)) void gather_records(const T* data, const std::int32_t* index,
+                                                          Lane<T>* component) {
+#ifdef __AVX512F__
+  // Records are as long as a vector: load each whole, then turn rows into columns, which costs a
+  // third of what loading every number by itself does.
+  static_assert(record_length == lanes);
+  Lane<T> row[lanes];
+  for (std::size_t l = 0; l < lanes; ++l)
+    __builtin_memcpy(&row[l], data + static_cast<std::ptrdiff_t>(index[l]) * record_length,
+                     sizeof(Lane<T>));
+  Lane<T> pairs[2][4];  // even and odd components of rows 2 k and 2 k + 1
+  for (int k = 0; k < 4; ++k) {
+    const Lane<T> a = row[2 * k], b = row[2 * k + 1];
+    pairs[0][k] = __builtin_shufflevector(a, b, 0, 8, 2, 10, 4, 12, 6, 14);
+    pairs[1][k] = __builtin_shufflevector(a, b, 1, 9, 3, 11, 5, 13, 7, 15);
+  }
+  for (int odd = 0; odd < 2; ++odd) {
+    const Lane<T>* const u = pairs[odd];
+    const Lane<T> low01 = __builtin_shufflevector(u[0], u[1], 0, 1, 2, 3, 8, 9, 10, 11);
+    const Lane<T> low23 = __builtin_shufflevector(u[2], u[3], 0, 1, 2, 3, 8, 9, 10, 11);
+    const Lane<T> high01 = __builtin_shufflevector(u[0], u[1], 4, 5, 6, 7, 12, 13, 14, 15);
+    const Lane<T> high23 = __builtin_shufflevector(u[2], u[3], 4, 5, 6, 7, 12, 13, 14, 15);
+    component[odd] = __builtin_shufflevector(low01, low23, 0, 1, 4, 5, 8, 9, 12, 13);
+    component[2 + odd] = __builtin_shufflevector(low01, low23, 2, 3, 6, 7, 10, 11, 14, 15);
+    component[4 + odd] = __builtin_shufflevector(high01, high23, 0, 1, 4, 5, 8, 9, 12, 13);
+    component[6 + odd] = __builtin_shufflevector(high01, high23, 2, 3, 6, 7, 10, 11, 14, 15);
+  }
+#else
+  for (std::size_t c = 0; c < record_length; ++c)
+    component[c] = gather(data, index, record_length, static_cast<int>(c));
+#endif
+}
+
 template <class To, class From>
 inline __attribute__((always_inline)) Lane<To> narrow(Lane<From> value) {
   if constexpr (sizeof(To) == sizeof(From))

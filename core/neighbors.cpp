@@ -7,7 +7,7 @@ namespace varve::core {
 
 template <int D, class Position>
 std::int64_t CellGrid<D, Position>::cell_along(double x, int axis) const {
-  const double scaled = std::floor((x - origin_[axis]) * inverse_cell_[axis]);
+  const double scaled = (x - origin_[axis]) * inverse_cell_[axis];
   if (!(scaled >= 0)) return 0;
   if (scaled >= static_cast<double>(size_[axis])) return size_[axis] - 1;
   return static_cast<std::int64_t>(scaled);
@@ -75,8 +75,8 @@ void CellGrid<D, Position>::build(std::span<const Vec<Position, D>> points, doub
   fullest_ = 0;
   for (std::size_t c = 0; c < total; ++c)
     fullest_ = std::max<std::size_t>(fullest_, start_[c + 1] - start_[c]);
-  ids_.resize(points.size());
-  for (auto& axis : coordinates_) axis.resize(points.size());
+  ids_.resize(points.size() + lanes);
+  for (auto& axis : coordinates_) axis.resize(points.size() + lanes);
   next_.assign(start_.begin(), start_.end() - 1);
   for (std::size_t i = 0; i < points.size(); ++i) {
     const std::uint32_t place = next_[cell_of_[i]]++;
@@ -85,85 +85,73 @@ void CellGrid<D, Position>::build(std::span<const Vec<Position, D>> points, doub
   }
 }
 
-namespace {
-
-/// Appends the ids of [begin, end) nearer to `point` than the root of `limit`; returns the new end.
-/// Written without a branch on the distance, which is as good as random.
-template <int D, bool periodic>
-std::int32_t* near(const double* const* x, const std::int32_t* ids, std::uint32_t begin,
-                   std::uint32_t end, const double* point, const double* period, double limit,
-                   std::int32_t* out) {
-  for (std::uint32_t k = begin; k < end; ++k) {
-    double r2 = 0;
-    for (int a = 0; a < D; ++a) {
-      double d = point[a] - x[a][k];
-      if constexpr (periodic) {
-        const double length = period[a];
-        d = d > 0.5 * length ? d - length : d;
-        d = d < -0.5 * length ? d + length : d;
+template <int D, class Position>
+int CellGrid<D, Position>::around(const Vec<Position, D>& point, Stretch* stretches) const {
+  // Along a periodic axis of one or two cells the neighbours repeat; each is visited once. Only
+  // along x, where cells lie side by side, do several make one stretch.
+  std::int64_t cells[3][3] = {};
+  int counts[3] = {1, 1, 1};
+  for (int a = 0; a < D; ++a) {
+    const std::int64_t middle = cell_along(static_cast<double>(point[a]), a);
+    counts[a] = 0;
+    for (std::int64_t step = -1; step <= 1; ++step) {
+      std::int64_t c = middle + step;
+      if (c < 0 || c >= size_[a]) {
+        if (!periodic_[a]) continue;
+        c = (c + size_[a]) % size_[a];
       }
-      r2 += d * d;
+      if (periodic_[a] && counts[a] > 0 && c == cells[a][0]) continue;
+      if (periodic_[a] && counts[a] > 1 && c == cells[a][1]) continue;
+      cells[a][counts[a]++] = c;
     }
-    *out = ids[k];
-    out += r2 < limit ? 1 : 0;
   }
-  return out;
+  int count = 0;
+  for (int z = 0; z < counts[2]; ++z)
+    for (int y = 0; y < counts[1]; ++y) {
+      std::int64_t row = cells[1][y] * size_[0];
+      if constexpr (D == 3) row += cells[2][z] * size_[0] * size_[1];
+      for (int x = 0; x < counts[0];) {
+        const std::int64_t from = cells[0][x];
+        std::int64_t to = from;
+        while (x < counts[0] && cells[0][x] == to) ++x, ++to;
+        stretches[count++] = {start_[static_cast<std::size_t>(row + from)],
+                              start_[static_cast<std::size_t>(row + to)]};
+      }
+    }
+  return count;
 }
-
-}  // namespace
-
-namespace {
-
-/// Sorts different numbers. A short row is sorted by counting for each number the smaller ones,
-/// which takes no branch that could be guessed wrong.
-void sort_row(std::int32_t* first, std::int32_t* last) {
-  constexpr std::ptrdiff_t short_row = 64;
-  const std::ptrdiff_t count = last - first;
-  if (count > short_row) {
-    std::sort(first, last);
-    return;
-  }
-  std::int32_t sorted[short_row];
-  for (std::ptrdiff_t i = 0; i < count; ++i) {
-    std::int32_t smaller = 0;
-    for (std::ptrdiff_t j = 0; j < count; ++j) smaller += first[j] < first[i] ? 1 : 0;
-    sorted[smaller] = first[i];
-  }
-  std::copy_n(sorted, count, first);
-}
-
-}  // namespace
 
 template <int D, class Position>
 void find_candidates(std::span<const Vec<Position, D>> from, const CellGrid<D, Position>& grid,
                      double radius, const Periodicity<D>& period, bool same, Workers& workers,
-                     RowParts& parts, Rows& rows) {
+                     InstructionSet set, RowParts& parts, Rows& rows) {
   // Each thread fills its own part; the parts are joined in order, so that the result does not
   // depend on how many there are.
   parts.resize(workers.count());
   rows.start.assign(from.size() + 1, 0);
-  const double limit = radius * radius;
-  const double* coordinates[D];
-  for (int a = 0; a < D; ++a) coordinates[a] = grid.coordinates(a);
-  const auto filter = period.any() ? near<D, true> : near<D, false>;
+  RowSearchData<D> data;
+  for (int a = 0; a < D; ++a) {
+    data.coordinates[a] = grid.coordinates(a);
+    data.period[a] = period.length[a];
+  }
+  data.ids = grid.ids();
+  data.radius2 = radius * radius;
+  const RowSearch<D> search = row_search<D>(period.any(), set);
   constexpr std::size_t cells_around = D == 2 ? 9 : 27;
-  const std::size_t most = cells_around * grid.fullest_cell() + 1;
+  const std::size_t most = cells_around * grid.fullest_cell() + lanes;
   constexpr std::size_t grain = 64;
   workers.run(from.size(), grain, [&](std::size_t begin, std::size_t end, unsigned thread) {
     std::vector<std::int32_t>& part = parts[thread];
     std::size_t used = 0;
+    Stretch stretches[CellGrid<D, Position>::most_stretches];
     for (std::size_t i = begin; i < end; ++i) {
       if (part.size() < used + most) part.resize(std::max(used + most, 2 * part.size()));
       double point[D];
       for (int a = 0; a < D; ++a) point[a] = static_cast<double>(from[i][a]);
       std::int32_t* const first = part.data() + used;
-      std::int32_t* last = first;
-      grid.around(from[i], [&](std::uint32_t from_place, std::uint32_t to_place) {
-        last = filter(coordinates, grid.ids(), from_place, to_place, point, period.length, limit,
-                      last);
-      });
-      sort_row(first, last);
-      if (same) last = std::remove(first, last, static_cast<std::int32_t>(i));
+      std::int32_t* const last = search(data, stretches, grid.around(from[i], stretches), point,
+                                        same ? static_cast<std::int32_t>(i) : -1, first);
+      if (last - first > longest_sorted) std::sort(first, last);
       rows.start[i + 1] = static_cast<std::uint32_t>(last - first);
       used += static_cast<std::size_t>(last - first);
     }
@@ -179,10 +167,11 @@ void find_candidates(std::span<const Vec<Position, D>> from, const CellGrid<D, P
 
 template <int D, class Position>
 Rows candidates(std::span<const Vec<Position, D>> from, const CellGrid<D, Position>& grid,
-                double radius, const Periodicity<D>& period, bool same, Workers& workers) {
+                double radius, const Periodicity<D>& period, bool same, Workers& workers,
+                InstructionSet set) {
   RowParts parts;
   Rows rows;
-  find_candidates<D, Position>(from, grid, radius, period, same, workers, parts, rows);
+  find_candidates<D, Position>(from, grid, radius, period, same, workers, set, parts, rows);
   return rows;
 }
 
@@ -218,29 +207,17 @@ template class CellGrid<2, double>;
 template class CellGrid<2, float>;
 template class CellGrid<3, double>;
 template class CellGrid<3, float>;
-template Rows candidates<2, double>(std::span<const Vec<double, 2>>, const CellGrid<2, double>&,
-                                    double, const Periodicity<2>&, bool, Workers&);
-template Rows candidates<2, float>(std::span<const Vec<float, 2>>, const CellGrid<2, float>&,
-                                   double, const Periodicity<2>&, bool, Workers&);
-template Rows candidates<3, double>(std::span<const Vec<double, 3>>, const CellGrid<3, double>&,
-                                    double, const Periodicity<3>&, bool, Workers&);
-template Rows candidates<3, float>(std::span<const Vec<float, 3>>, const CellGrid<3, float>&,
-                                   double, const Periodicity<3>&, bool, Workers&);
-template void find_candidates<2, double>(std::span<const Vec<double, 2>>,
-                                         const CellGrid<2, double>&, double,
-                                         const Periodicity<2>&, bool, Workers&, RowParts&,
-                                         Rows&);
-template void find_candidates<2, float>(std::span<const Vec<float, 2>>,
-                                         const CellGrid<2, float>&, double,
-                                         const Periodicity<2>&, bool, Workers&, RowParts&,
-                                         Rows&);
-template void find_candidates<3, double>(std::span<const Vec<double, 3>>,
-                                         const CellGrid<3, double>&, double,
-                                         const Periodicity<3>&, bool, Workers&, RowParts&,
-                                         Rows&);
-template void find_candidates<3, float>(std::span<const Vec<float, 3>>,
-                                         const CellGrid<3, float>&, double,
-                                         const Periodicity<3>&, bool, Workers&, RowParts&,
-                                         Rows&);
+#define VARVE_INSTANTIATE(D, Position)                                                           \
+  template Rows candidates<D, Position>(std::span<const Vec<Position, D>>,                       \
+                                        const CellGrid<D, Position>&, double,                    \
+                                        const Periodicity<D>&, bool, Workers&, InstructionSet);  \
+  template void find_candidates<D, Position>(                                                    \
+      std::span<const Vec<Position, D>>, const CellGrid<D, Position>&, double,                   \
+      const Periodicity<D>&, bool, Workers&, InstructionSet, RowParts&, Rows&);
+VARVE_INSTANTIATE(2, double)
+VARVE_INSTANTIATE(2, float)
+VARVE_INSTANTIATE(3, double)
+VARVE_INSTANTIATE(3, float)
+#undef VARVE_INSTANTIATE
 
 }  // namespace varve::core

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/pair_sweeps.h"
+#include "core/row_search.h"
 #include "core/workers.h"
 
 namespace varve::core {
@@ -34,11 +35,12 @@ class CellGrid {
   /// with a coordinate that is not finite are put in the first cell.
   void build(std::span<const Vec<Position, D>> points, double cell, const Periodicity<D>& period);
 
-  /// Calls visit(begin, end) for stretches [begin, end) of the cell-ordered arrays that together
-  /// hold all points within one cell of `point`, each once, in no particular order of id.
-  template <class Visit>
-  void around(const Vec<Position, D>& point, Visit&& visit) const;
+  /// Where the points within one cell of `point` are in the cell-ordered arrays, each once, in no
+  /// particular order of id; returns how many stretches these are.
+  static constexpr int most_stretches = D == 2 ? 9 : 27;
+  int around(const Vec<Position, D>& point, Stretch* stretches) const;
 
+  /// [m] and ids in cell order; a vector's worth of numbers behind the last point may be read.
   const double* coordinates(int axis) const { return coordinates_[axis].data(); }
   const std::int32_t* ids() const { return ids_.data(); }
   /// Points in the fullest cell: no more than 3^D of these lie around any point.
@@ -71,7 +73,8 @@ struct Rows {
 /// points.
 template <int D, class Position>
 Rows candidates(std::span<const Vec<Position, D>> from, const CellGrid<D, Position>& grid,
-                double radius, const Periodicity<D>& period, bool same, Workers& workers);
+                double radius, const Periodicity<D>& period, bool same, Workers& workers,
+                InstructionSet set = best_instruction_set());
 
 /// What each thread has found, kept from one search to the next for its memory.
 using RowParts = std::vector<std::vector<std::int32_t>>;
@@ -79,7 +82,7 @@ using RowParts = std::vector<std::vector<std::int32_t>>;
 template <int D, class Position>
 void find_candidates(std::span<const Vec<Position, D>> from, const CellGrid<D, Position>& grid,
                      double radius, const Periodicity<D>& period, bool same, Workers& workers,
-                     RowParts& parts, Rows& rows);
+                     InstructionSet set, RowParts& parts, Rows& rows);
 
 /// What short lanes are filled with.
 enum class Filler { own_index, minus_one, one_past };
@@ -96,49 +99,5 @@ class GroupedStorage {
   std::vector<std::uint32_t> start_;
   std::vector<std::int32_t> index_;
 };
-
-// ---- template bodies ----
-
-template <int D, class Position>
-template <class Visit>
-void CellGrid<D, Position>::around(const Vec<Position, D>& point, Visit&& visit) const {
-  // Along a periodic axis of one or two cells the neighbours repeat; each is visited once.
-  std::int64_t cells[3][3] = {};
-  int counts[3] = {};
-  for (int a = 0; a < D; ++a) {
-    const std::int64_t middle = cell_along(static_cast<double>(point[a]), a);
-    counts[a] = 0;
-    for (std::int64_t step = -1; step <= 1; ++step) {
-      std::int64_t c = middle + step;
-      if (periodic_[a])
-        c = (c + size_[a]) % size_[a];
-      else if (c < 0 || c >= size_[a])
-        continue;
-      bool repeated = false;
-      for (int k = 0; k < counts[a]; ++k) repeated = repeated || cells[a][k] == c;
-      if (!repeated) cells[a][counts[a]++] = c;
-    }
-  }
-  const int planes = D == 3 ? counts[2] : 1;
-  for (int z = 0; z < planes; ++z)
-    for (int y = 0; y < counts[1]; ++y) {
-      std::int64_t row = cells[1][y] * size_[0];
-      if constexpr (D == 3) row += cells[2][z] * size_[0] * size_[1];
-      // Cells side by side in a row are one stretch; there is at least the middle one.
-      std::int64_t from = cells[0][0], to = from;
-      const auto stretch = [&] {
-        visit(start_[static_cast<std::size_t>(row + from)],
-              start_[static_cast<std::size_t>(row + to)]);
-      };
-      for (int x = 0; x < counts[0]; ++x) {
-        if (cells[0][x] != to) {
-          stretch();
-          from = to = cells[0][x];
-        }
-        ++to;
-      }
-      stretch();
-    }
-}
 
 }  // namespace varve::core

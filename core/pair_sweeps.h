@@ -19,6 +19,20 @@ namespace varve::core {
 
 inline constexpr std::size_t lanes = 8;
 
+/// What pairs ask of a particle, side by side in memory, so that a neighbour costs one cache line:
+/// its position where that has the numbers' type, its velocity, then two numbers that differ from
+/// sweep to sweep.
+inline constexpr std::size_t record_length = 8;
+template <class Real>
+struct alignas(record_length * sizeof(Real)) PairRecord {
+  Real number[record_length] = {};
+};
+template <int D, class P>
+inline constexpr std::size_t record_velocity =
+    sizeof(typename P::Position) == sizeof(typename P::Real) ? std::size_t(D) : 0;
+template <int D, class P>
+inline constexpr std::size_t record_first = record_velocity<D, P> + std::size_t(D);
+
 /// Neighbour candidates of groups of `lanes` consecutive particles, interleaved: entry k of lane l
 /// in group g is index[(start[g] + k) * lanes + l]; short lanes are filled with `filler` entries
 /// that contribute nothing (the particle itself, or a padding point far away).
@@ -39,8 +53,9 @@ struct SweepData {
   const Real* mass = nullptr;             // [kg]
   const Real* superficial_density = nullptr;  // rhob(n)
   const Real* porosity = nullptr;         // floored; nullptr: 1 everywhere
-  const Real* volume_before = nullptr;    // m / rhob(n)
-  const Real* density_before = nullptr;   // rho(n) = rhob / eps
+  /// Of the fluid. The two numbers are, for `density`, rho(n) = rhob / eps and m / rhob(n); for
+  /// `stress`, `push` and `volume`.
+  const PairRecord<Real>* records = nullptr;
   GroupedLists fluid, walls;              // of fluid particles: fluid and dummy candidates
   GroupedLists of_walls;                  // of dummies: fluid candidates
 

@@ -63,22 +63,44 @@ inline T power_of_length(T h) {
   return D == 2 ? h * h : h * h * h;
 }
 
+/// Of eight particles: position, velocity and the two numbers of their records.
+template <int D, class P>
+struct Particles {
+  using Real = typename P::Real;
+  using Position = typename P::Position;
+  Lane<Position> x[D];
+  Lane<Real> v[D], first, second;
+
+  inline __attribute__((always_inline)) Particles(const SweepData<D, P>& s,
+                                                  const std::int32_t* index) {
+    Lane<Real> number[record_length];
+    gather_records(s.records[0].number, index, number);
+    for (int c = 0; c < D; ++c) {
+      if constexpr (record_velocity<D, P> == 0)
+        x[c] = gather(s.position, index, D, c);
+      else
+        x[c] = number[c];
+      v[c] = number[record_velocity<D, P> + std::size_t(c)];
+    }
+    first = number[record_first<D, P>];
+    second = number[record_first<D, P> + 1];
+  }
+};
+
 /// What one slot of a list holds for eight lanes: separation, its square, kernel argument.
 template <int D, class P>
 struct Separation {
   using Real = typename P::Real;
+  using Position = typename P::Position;
   Lane<Real> d[D], r2, q;
 
   template <bool periodic>
-  inline __attribute__((always_inline)) void set(const Lane<typename P::Position>* own,
-                                                 const typename P::Position* other,
-                                                 const std::int32_t* index,
-                                                 const typename P::Position* period,
-                                                 Real inverse_h) {
-    using Position = typename P::Position;
+  inline __attribute__((always_inline)) void set(const Lane<Position>* own,
+                                                 const Lane<Position>* other,
+                                                 const Position* period, Real inverse_h) {
     r2 = Lane<Real>{};
     for (int c = 0; c < D; ++c) {
-      Lane<Position> wide = own[c] - gather(other, index, D, c);
+      Lane<Position> wide = own[c] - other[c];
       if constexpr (periodic) {
         const Position length = period[c], half = length * Position(0.5);
         const Lane<Position> lengths = length - Lane<Position>{};
@@ -92,6 +114,14 @@ struct Separation {
     q = r2;
     square_root<Real>(q);
     q *= inverse_h;
+  }
+  template <bool periodic>
+  inline __attribute__((always_inline)) void set(const Lane<Position>* own, const Position* other,
+                                                 const std::int32_t* index,
+                                                 const Position* period, Real inverse_h) {
+    Lane<Position> x[D];
+    for (int c = 0; c < D; ++c) x[c] = gather(other, index, D, c);
+    set<periodic>(own, x, period, inverse_h);
   }
 };
 
@@ -117,7 +147,6 @@ struct OwnIndex {
 template <int D, class P, Kernel K, bool periodic>
 void density_loop(const SweepData<D, P>& s, std::size_t group_begin, std::size_t group_end) {
   using Real = typename P::Real;
-  using Position = typename P::Position;
   const Real inverse_h = Real(1) / s.smoothing_length;
   const Real slope_scale =
       normalisation<K, D, Real>() / power_of_length<D>(s.smoothing_length) * inverse_h * inverse_h;
@@ -125,34 +154,28 @@ void density_loop(const SweepData<D, P>& s, std::size_t group_begin, std::size_t
   const Real stiffness = s.sound_speed * s.sound_speed;
   for (std::size_t g = group_begin; g < group_end; ++g) {
     const OwnIndex own(g, s.count);
-    Lane<Position> x[D];
-    Lane<Real> v[D];
-    for (int c = 0; c < D; ++c) {
-      x[c] = gather(s.position, own.index, D, c);
-      v[c] = gather(s.velocity, own.index, D, c);
-    }
-    const Lane<Real> rho = gather(s.density_before, own.index, 1, 0);
+    const Particles<D, P> here(s, own.index);
     Lane<Real> divergence{}, spread{};
     Separation<D, P> pair;
     for (std::uint32_t k = s.fluid.start[g]; k < s.fluid.start[g + 1]; ++k) {
       const std::int32_t* j = s.fluid.index + std::size_t(k) * lanes;
-      pair.template set<periodic>(x, s.position, j, s.period, inverse_h);
-      Lane<Real> approach{}, drop = rho - gather(s.density_before, j, 1, 0);
+      const Particles<D, P> there(s, j);
+      pair.template set<periodic>(here.x, there.x, s.period, inverse_h);
+      Lane<Real> approach{}, drop = here.first - there.first;
       for (int c = 0; c < D; ++c) {
-        approach += (v[c] - gather(s.velocity, j, D, c)) * pair.d[c];
+        approach += (here.v[c] - there.v[c]) * pair.d[c];
         drop += s.hydrostatic_gradient[c] * -pair.d[c];
       }
-      const Lane<Real> weight =
-          gather(s.volume_before, j, 1, 0) * kernel_slope<K, Real>(pair.q);
+      const Lane<Real> weight = there.second * kernel_slope<K, Real>(pair.q);
       divergence += weight * approach;
       spread += weight * drop;
     }
     for (std::uint32_t k = s.walls.start[g]; k < s.walls.start[g + 1]; ++k) {
       const std::int32_t* j = s.walls.index + std::size_t(k) * lanes;
-      pair.template set<periodic>(x, s.wall_position, j, s.period, inverse_h);
+      pair.template set<periodic>(here.x, s.wall_position, j, s.period, inverse_h);
       Lane<Real> approach{};
       for (int c = 0; c < D; ++c)
-        approach += (v[c] - gather(s.wall_own_velocity, j, D, c)) * pair.d[c];
+        approach += (here.v[c] - gather(s.wall_own_velocity, j, D, c)) * pair.d[c];
       divergence += gather(s.wall_volume, j, 1, 0) * kernel_slope<K, Real>(pair.q) * approach;
     }
     for (std::size_t l = 0; l < own.used; ++l) {
@@ -236,7 +259,6 @@ void extrapolate_loop(const SweepData<D, P>& s, std::size_t group_begin, std::si
 template <int D, class P, Kernel K, bool periodic, bool conjugate>
 void stress_loop(const SweepData<D, P>& s, std::size_t group_begin, std::size_t group_end) {
   using Real = typename P::Real;
-  using Position = typename P::Position;
   const Real inverse_h = Real(1) / s.smoothing_length;
   const Real slope_scale =
       normalisation<K, D, Real>() / power_of_length<D>(s.smoothing_length) * inverse_h * inverse_h;
@@ -244,37 +266,33 @@ void stress_loop(const SweepData<D, P>& s, std::size_t group_begin, std::size_t 
   const Real viscous = Real(2) * s.viscosity;
   for (std::size_t g = group_begin; g < group_end; ++g) {
     const OwnIndex own(g, s.count);
-    Lane<Position> x[D];
-    Lane<Real> v[D], force[D] = {}, shear[D] = {};
-    for (int c = 0; c < D; ++c) {
-      x[c] = gather(s.position, own.index, D, c);
-      v[c] = gather(s.velocity, own.index, D, c);
-    }
-    const Lane<Real> p = gather<Real>(s.push, own.index, 1, 0);
+    const Particles<D, P> here(s, own.index);
+    Lane<Real> force[D] = {}, shear[D] = {};
     const auto add = [&](Lane<Real> push, Lane<Real> drag, int c, Lane<Real> other) {
       if constexpr (conjugate) {
         force[c] += push;
-        shear[c] += drag * (v[c] - other);
+        shear[c] += drag * (here.v[c] - other);
       } else {
-        force[c] += push + drag * (v[c] - other);
+        force[c] += push + drag * (here.v[c] - other);
       }
     };
     Separation<D, P> pair;
     for (std::uint32_t k = s.fluid.start[g]; k < s.fluid.start[g + 1]; ++k) {
       const std::int32_t* j = s.fluid.index + std::size_t(k) * lanes;
-      pair.template set<periodic>(x, s.position, j, s.period, inverse_h);
-      const Lane<Real> weight = gather(s.volume, j, 1, 0) * kernel_slope<K, Real>(pair.q);
-      const Lane<Real> push = -(p + gather<Real>(s.push, j, 1, 0)) * weight;
+      const Particles<D, P> there(s, j);
+      pair.template set<periodic>(here.x, there.x, s.period, inverse_h);
+      const Lane<Real> weight = there.second * kernel_slope<K, Real>(pair.q);
+      const Lane<Real> push = -(here.first + there.first) * weight;
       const Lane<Real> drag = viscous * weight * (pair.r2 / (pair.r2 + soft));
       for (int c = 0; c < D; ++c)
-        add(push * pair.d[c], drag, c, gather(s.velocity, j, D, c));
+        add(push * pair.d[c], drag, c, there.v[c]);
     }
     for (std::uint32_t k = s.walls.start[g]; k < s.walls.start[g + 1]; ++k) {
       const std::int32_t* j = s.walls.index + std::size_t(k) * lanes;
-      pair.template set<periodic>(x, s.wall_position, j, s.period, inverse_h);
+      pair.template set<periodic>(here.x, s.wall_position, j, s.period, inverse_h);
       const Lane<Real> slope = kernel_slope<K, Real>(pair.q);
       const Lane<Real> push =
-          -(p + gather<Real>(s.wall_push, j, 1, 0)) * (gather(s.wall_volume, j, 1, 0) * slope);
+          -(here.first + gather<Real>(s.wall_push, j, 1, 0)) * (gather(s.wall_volume, j, 1, 0) * slope);
       const Lane<Real> drag = viscous * (gather(s.wall_viscous_volume, j, 1, 0) * slope) *
                               (pair.r2 / (pair.r2 + soft));
       for (int c = 0; c < D; ++c)

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include "core/kernel.h"
@@ -56,6 +57,31 @@ std::vector<Wall> domain_walls(const Scenario& scenario) {
                      d.left + 0.5 * d.width, 0.5 * d.depth});
   return walls;
 }
+
+template <int D>
+Box<D> clear_of_walls(const std::vector<Wall>& walls) {
+  constexpr double endless = std::numeric_limits<double>::infinity();
+  Box<D> clear;
+  clear.lower.setConstant(-endless);
+  clear.upper.setConstant(endless);
+  for (const Wall& wall : walls) {
+    if (wall.is_pipe()) {
+      const double inscribed = 0.7 * wall.radius;  // below the half side of the square in the round
+      const double centre[] = {wall.centre_x, 0, wall.centre_z};
+      for (int k = 0; k < D; k += 2) {
+        clear.lower[k] = centre[k] - inscribed;
+        clear.upper[k] = centre[k] + inscribed;
+      }
+    } else if (wall.inward > 0) {
+      clear.lower[wall.axis] = wall.at;
+    } else {
+      clear.upper[wall.axis] = wall.at;
+    }
+  }
+  return clear;
+}
+template Box<2> clear_of_walls<2>(const std::vector<Wall>&);
+template Box<3> clear_of_walls<3>(const std::vector<Wall>&);
 
 int fluid_dummy_layers(const Scenario& scenario) {
   const Fluid& f = scenario.fluid;

@@ -101,6 +101,11 @@ Vec<double, D> inward_normal(const Wall& wall, const Vec<double, D>& x) {
   return wall.inward * Vec<double, D>::Unit(wall.axis);
 }
 
+/// A box of which every point lies inside all walls, for a quick answer before any wall is asked:
+/// the whole of a box-shaped domain, the part around the axis of a pipe. Unbounded where no wall is.
+template <int D>
+Box<D> clear_of_walls(const std::vector<Wall>& walls);
+
 /// A fixed particle of Adami's wall model. In an edge or corner it belongs to the bottom or top
 /// wall, else to the left or right one.
 template <int D>
