@@ -292,7 +292,8 @@ void stress_loop(const SweepData<D, P>& s, std::size_t group_begin, std::size_t 
       pair.template set<periodic>(here.x, s.wall_position, j, s.period, inverse_h);
       const Lane<Real> slope = kernel_slope<K, Real>(pair.q);
       const Lane<Real> push =
-          -(here.first + gather<Real>(s.wall_push, j, 1, 0)) * (gather(s.wall_volume, j, 1, 0) * slope);
+          -(here.first + gather<Real>(s.wall_push, j, 1, 0)) *
+          (gather(s.wall_volume, j, 1, 0) * slope);
       const Lane<Real> drag = viscous * (gather(s.wall_viscous_volume, j, 1, 0) * slope) *
                               (pair.r2 / (pair.r2 + soft));
       for (int c = 0; c < D; ++c)

@@ -1,6 +1,6 @@
 // The hot loop of list building: which points of a few stretches of memory are near one point. Like
-// the pair sweeps it is compiled once per instruction set; what it finds, and in which order, is the
-// same on all.
+// the pair sweeps it is compiled once per instruction set; what it finds, and in which order, is
+// the same on all.
 #pragma once
 
 #include <cstddef>

@@ -102,7 +102,7 @@ Vec<double, D> inward_normal(const Wall& wall, const Vec<double, D>& x) {
 }
 
 /// A box of which every point lies inside all walls, for a quick answer before any wall is asked:
-/// the whole of a box-shaped domain, the part around the axis of a pipe. Unbounded where no wall is.
+/// the whole of a box-shaped domain, the part around the axis of a pipe. Endless where no wall is.
 template <int D>
 Box<D> clear_of_walls(const std::vector<Wall>& walls);
 

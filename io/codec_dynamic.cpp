@@ -17,6 +17,9 @@ namespace {
 /// Fields of fewer values are written as variable-length numbers or byte planes: they do not pay
 /// for the entropy coder's model.
 constexpr std::size_t staged_values_min = 384;
+/// Frames between two looks whether byte planes would make such a field smaller than numbers do: a
+/// call of zstd takes as long as hundreds of values of a large field.
+constexpr unsigned planes_interval = 16;
 
 /// Integers have no second stage.
 struct NoStage {
@@ -37,6 +40,7 @@ class TrackField final : public DynamicField {
 
   void restart(const FieldView& frame) override {
     track_.restart(frame.bytes, frame.count);
+    numbers_are_smaller_ = false;
     forget();
   }
 
@@ -177,17 +181,29 @@ class TrackField final : public DynamicField {
     });
     track_.end_frame();
     const std::span<const U> folded(folded_);
-    std::vector<std::byte> numbers = out.payload;
+    const bool few = folded.size() < staged_values_min;
+    const std::size_t head = out.payload.size();
+    if (few && numbers_are_smaller_ && ++frames_since_planes_ < planes_interval) {
+      encode_numbers(folded, out);
+      return;
+    }
+    frames_since_planes_ = 0;
     out.method = static_cast<std::uint8_t>(Method::residual_planes);
     encode_planes(folded, zstd, scratch_, out.payload);
-    if (folded.size() < staged_values_min) {
-      ByteSink sink(numbers);
-      encode_varints(folded, sink);
-      if (numbers.size() <= out.payload.size()) {
-        out.method = static_cast<std::uint8_t>(Method::residual_varint);
-        out.payload = std::move(numbers);
-      }
-    }
+    if (!few) return;
+    const std::vector<std::byte> planes = out.payload;
+    out.payload.resize(head);
+    encode_numbers(folded, out);
+    numbers_are_smaller_ = out.payload.size() <= planes.size();
+    if (numbers_are_smaller_) return;
+    out.method = static_cast<std::uint8_t>(Method::residual_planes);
+    out.payload = planes;
+  }
+
+  void encode_numbers(std::span<const U> folded, EncodedField& out) {
+    out.method = static_cast<std::uint8_t>(Method::residual_varint);
+    ByteSink sink(out.payload);
+    encode_varints(folded, sink);
   }
 
   void decode_simple(Method method, ByteSource& source, const Weights& weights, Zstd& zstd,
@@ -220,6 +236,8 @@ class TrackField final : public DynamicField {
   std::conditional_t<floating, StagedCoder<T>, NoStage> staged_;
   std::vector<U> folded_;
   std::vector<std::byte> scratch_;
+  bool numbers_are_smaller_ = false;  ///< when last looked at
+  unsigned frames_since_planes_ = 0;
 };
 
 }  // namespace

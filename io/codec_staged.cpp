@@ -10,7 +10,8 @@ namespace {
 
 /// Frames between two looks at the model of the entropy coder, once the history is old.
 constexpr unsigned model_interval = 16;
-/// Values of a frame that are counted for it.
+/// Frames between two that are counted for it, and values of each.
+constexpr unsigned count_interval = 4;
 constexpr std::size_t count_values = 4096;
 /// Runs of neighbours per component on which levels are measured.
 constexpr std::size_t sample_run = 16;
@@ -149,12 +150,15 @@ void StagedCoder<T>::decode(Track<T>& track, ByteSource& source, const Weights& 
 /// true if that saves more than its description costs.
 template <class T>
 bool StagedCoder<T>::improve_model(bool fresh) {
-  const std::size_t stride = std::max<std::size_t>(1, tokens_.size() / count_values) | 1;
-  for (std::size_t i = 0; i < tokens_.size(); i += stride) {
-    ++counts_[expected_[i].context & 0x7f][tokens_[i].symbol];
+  const bool due = fresh || ++frames_since_model_ >= frames_to_model_;
+  if (due || frames_since_model_ % count_interval == 0) {
+    const std::size_t stride = std::max<std::size_t>(1, tokens_.size() / count_values) | 1;
+    for (std::size_t i = 0; i < tokens_.size(); i += stride) {
+      ++counts_[expected_[i].context & 0x7f][tokens_[i].symbol];
+    }
+    counted_ += tokens_.size() / stride;
   }
-  counted_ += tokens_.size() / stride;
-  if (!fresh && ++frames_since_model_ < frames_to_model_) {
+  if (!due) {
     return false;
   }
   frames_since_model_ = 0;
