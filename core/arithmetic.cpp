@@ -47,9 +47,7 @@ void require_exact_arithmetic() {
 }
 
 void require_exact_arithmetic(Workers& workers) {
-  // One item per thread: a part each.
-  workers.run(workers.count(), 1,
-              [](std::size_t, std::size_t, unsigned) { require_exact_arithmetic(); });
+  workers.run_on_each([] { require_exact_arithmetic(); });
 }
 
 }  // namespace varve::core

@@ -222,14 +222,14 @@ void Contacts<D, P>::sub_step(const Step& step, bool fresh, const GrainState<D, 
   data.push_stride = stride_for(at_once * lanes);
   pushes_.resize(data.push_stride * Out::count);
   data.pushes = pushes_.data();
-  std::vector<std::size_t> worst(step.workers.count());
+  std::vector<std::size_t> worst(step.workers.parts());
   std::size_t i = 0, t = 0;
   for (std::size_t group = 0; group < groups; group += at_once) {
     data.window = group * lanes;
     std::fill(worst.begin(), worst.end(), touches_.count);
     step.workers.run(std::min(at_once, groups - group), groups_per_thread,
-                     [&](std::size_t begin, std::size_t end, unsigned thread) {
-                       worst[thread] = sweeps_.press(data, group + begin, group + end);
+                     [&](std::size_t begin, std::size_t end, unsigned part) {
+                       worst[part] = sweeps_.press(data, group + begin, group + end);
                      });
     const std::size_t bad = *std::min_element(worst.begin(), worst.end());
     if (bad < touches_.count) report_overlap(step, bad, grains);

@@ -181,10 +181,10 @@ void CouplingStage<D, P>::porosity(const Constants<D>& c, const State<D, P>& sta
       if (of_fluid > 0) spread_volume_[i] = own / of_fluid;
     }
   });
-  // Clamps are counted per fluid particle and added up in one fixed order; integers have no order.
-  std::vector<std::uint64_t> clamps(workers.count(), 0);
+  // Clamps are counted per part and added up; integers have no order.
+  std::vector<std::uint64_t> clamps(workers.parts(), 0);
   workers.run(state.fluid.size(), few_items, [&](std::size_t begin, std::size_t end,
-                                                  unsigned thread) {
+                                                  unsigned part) {
     for (std::size_t a = begin; a < end; ++a) {
       double solid = 0;
       for (std::uint32_t k = near_start_[a]; k < near_start_[a + 1]; ++k)
@@ -192,7 +192,7 @@ void CouplingStage<D, P>::porosity(const Constants<D>& c, const State<D, P>& sta
       const double eps = 1 - solid;
       porosity[a] = static_cast<Real>(eps);
       floored[a] = static_cast<Real>(std::max(eps, c.porosity_floor));
-      if (eps < c.porosity_floor) ++clamps[thread];
+      if (eps < c.porosity_floor) ++clamps[part];
     }
   });
   fluid_clamps_ = 0;

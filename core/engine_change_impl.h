@@ -12,7 +12,7 @@ template <int D, class P>
 Engine<D, P>::Engine(const Scenario& scenario, State<D, P> state, const RunOptions& options)
     : scenario_(scenario),
       state_(std::move(state)),
-      workers_(options.threads),
+      workers_(options.threads, options.own_parts_only),
       instruction_set_(options.instruction_set < 0
                            ? best_instruction_set()
                            : std::min(best_instruction_set(),

@@ -450,9 +450,9 @@ Vec<double, D> Engine<D, P>::wall_repulsion(const Vec<Position, D>& x) const {
 
 template <int D, class P>
 void Engine<D, P>::move_fluid() {
-  std::vector<std::size_t> bad(workers_.count(), engine_detail::nobody);
-  workers_.run(state_.fluid.size(), 64, [&](std::size_t begin, std::size_t end, unsigned thread) {
-    bad[thread] = move_fluid_part(begin, end);
+  std::vector<std::size_t> bad(workers_.parts(), engine_detail::nobody);
+  workers_.run(state_.fluid.size(), 64, [&](std::size_t begin, std::size_t end, unsigned part) {
+    bad[part] = move_fluid_part(begin, end);
   });
   digest_stage(Stage::integration);
   count_pass(engine_detail::pass_fluid);

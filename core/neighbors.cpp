@@ -125,9 +125,8 @@ template <int D, class Position>
 void find_candidates(std::span<const Vec<Position, D>> from, const CellGrid<D, Position>& grid,
                      double radius, const Periodicity<D>& period, bool same, Workers& workers,
                      InstructionSet set, RowParts& parts, Rows& rows) {
-  // Each thread fills its own part; the parts are joined in order, so that the result does not
-  // depend on how many there are.
-  parts.resize(workers.count());
+  // The parts are joined in order, so that the result does not depend on how many there are.
+  parts.resize(workers.parts());
   rows.start.assign(from.size() + 1, 0);
   RowSearchData<D> data;
   for (int a = 0; a < D; ++a) {
@@ -140,8 +139,8 @@ void find_candidates(std::span<const Vec<Position, D>> from, const CellGrid<D, P
   constexpr std::size_t cells_around = D == 2 ? 9 : 27;
   const std::size_t most = cells_around * grid.fullest_cell() + lanes;
   constexpr std::size_t grain = 64;
-  workers.run(from.size(), grain, [&](std::size_t begin, std::size_t end, unsigned thread) {
-    std::vector<std::int32_t>& part = parts[thread];
+  workers.run(from.size(), grain, [&](std::size_t begin, std::size_t end, unsigned number) {
+    std::vector<std::int32_t>& part = parts[number];
     std::size_t used = 0;
     Stretch stretches[CellGrid<D, Position>::most_stretches];
     for (std::size_t i = begin; i < end; ++i) {
@@ -158,9 +157,9 @@ void find_candidates(std::span<const Vec<Position, D>> from, const CellGrid<D, P
   });
   for (std::size_t i = 0; i < from.size(); ++i) rows.start[i + 1] += rows.start[i];
   rows.index.resize(rows.start[from.size()]);
-  // Divided as before, so that each thread copies what it has found.
-  workers.run(from.size(), grain, [&](std::size_t begin, std::size_t end, unsigned thread) {
-    std::copy_n(parts[thread].begin(), rows.start[end] - rows.start[begin],
+  // Divided as before, so that each part is copied where it belongs.
+  workers.run(from.size(), grain, [&](std::size_t begin, std::size_t end, unsigned number) {
+    std::copy_n(parts[number].begin(), rows.start[end] - rows.start[begin],
                 rows.index.begin() + rows.start[begin]);
   });
 }

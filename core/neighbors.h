@@ -76,7 +76,7 @@ Rows candidates(std::span<const Vec<Position, D>> from, const CellGrid<D, Positi
                 double radius, const Periodicity<D>& period, bool same, Workers& workers,
                 InstructionSet set = best_instruction_set());
 
-/// What each thread has found, kept from one search to the next for its memory.
+/// What each part of a search has found, kept from one search to the next for its memory.
 using RowParts = std::vector<std::vector<std::int32_t>>;
 /// The same into rows that may hold memory already.
 template <int D, class Position>

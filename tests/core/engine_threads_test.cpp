@@ -50,7 +50,9 @@ TEST(EngineThreads, AnyNumberGivesTheSameBitsAndEachDoesWork) {
     EXPECT_GT(alone.contact_rows, 0u) << scene.name;
     for (const unsigned threads : {2u, 3u, 4u, 8u}) {
       SCOPED_TRACE(scene.name + ", " + std::to_string(threads) + " threads");
-      const auto simulation = started(scene.scenario, {.threads = threads});
+      EXPECT_EQ(first_difference(alone, run(scene.scenario, {.threads = threads})), -1);
+      const auto simulation =
+          started(scene.scenario, {.threads = threads, .own_parts_only = true});
       EXPECT_EQ(first_difference(alone, traced(*simulation, run_steps)), -1);
       const std::vector<std::uint64_t>& items = simulation->counters().items_per_thread;
       EXPECT_EQ(items.size(), threads);
