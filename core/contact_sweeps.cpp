@@ -1,27 +1,14 @@
 #include "core/contact_sweeps.h"
 
+#include "core/instruction_sets.h"
+
 namespace varve::core {
 
-#define VARVE_DECLARE(isa)            \
-  namespace isa {                     \
-  template <int D, class P>           \
-  ContactSweeps<D, P> touch_sweeps(); \
-  }
-VARVE_DECLARE(isa_baseline)
-#ifdef VARVE_X86_64
-VARVE_DECLARE(isa_v3)
-VARVE_DECLARE(isa_v4)
-#endif
-#undef VARVE_DECLARE
+VARVE_DECLARE_FOR_ALL_SETS(template <int D, class P> ContactSweeps<D, P> touch_sweeps())
 
 template <int D, class P>
 ContactSweeps<D, P> contact_sweeps(InstructionSet set) {
-#ifdef VARVE_X86_64
-  if (set == InstructionSet::v4) return isa_v4::touch_sweeps<D, P>();
-  if (set == InstructionSet::v3) return isa_v3::touch_sweeps<D, P>();
-#endif
-  static_cast<void>(set);
-  return isa_baseline::touch_sweeps<D, P>();
+  return VARVE_OF_SET(set, touch_sweeps<D, P>());
 }
 
 #define VARVE_INSTANTIATE(D, P) template ContactSweeps<D, P> contact_sweeps<D, P>(InstructionSet);

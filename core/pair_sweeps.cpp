@@ -1,18 +1,11 @@
 #include "core/pair_sweeps.h"
 
+#include "core/instruction_sets.h"
+
 namespace varve::core {
 
-#define VARVE_DECLARE(isa)        \
-  namespace isa {                 \
-  template <int D, class P>       \
-  PairSweeps<D, P> sweeps(Kernel kernel, bool periodic, bool conjugate); \
-  }
-VARVE_DECLARE(isa_baseline)
-#ifdef VARVE_X86_64
-VARVE_DECLARE(isa_v3)
-VARVE_DECLARE(isa_v4)
-#endif
-#undef VARVE_DECLARE
+VARVE_DECLARE_FOR_ALL_SETS(template <int D, class P> PairSweeps<D, P> sweeps(
+    Kernel kernel, bool periodic, bool conjugate))
 
 std::string_view name_of(InstructionSet set) {
   switch (set) {
@@ -38,12 +31,7 @@ InstructionSet best_instruction_set() {
 
 template <int D, class P>
 PairSweeps<D, P> pair_sweeps(Kernel kernel, bool periodic, bool conjugate, InstructionSet set) {
-#ifdef VARVE_X86_64
-  if (set == InstructionSet::v4) return isa_v4::sweeps<D, P>(kernel, periodic, conjugate);
-  if (set == InstructionSet::v3) return isa_v3::sweeps<D, P>(kernel, periodic, conjugate);
-#endif
-  static_cast<void>(set);
-  return isa_baseline::sweeps<D, P>(kernel, periodic, conjugate);
+  return VARVE_OF_SET(set, sweeps<D, P>(kernel, periodic, conjugate));
 }
 
 #define VARVE_INSTANTIATE(D, P) \
