@@ -42,12 +42,13 @@ std::vector<std::vector<std::int32_t>> brute_force(const Points<D, T>& from, con
 template <int D, class T>
 std::vector<std::vector<std::int32_t>> by_cells(const Points<D, T>& from, const Points<D, T>& to,
                                                 double radius, const Periodicity<D>& period,
-                                                bool same, unsigned threads = 1) {
+                                                bool same, unsigned threads = 1,
+                                                InstructionSet set = best_instruction_set()) {
   Workers workers(threads);
   CellGrid<D, T> grid;
   grid.build(std::span<const Vec<T, D>>(to), radius, period);
-  const Rows rows =
-      candidates<D, T>(std::span<const Vec<T, D>>(from), grid, radius, period, same, workers);
+  const Rows rows = candidates<D, T>(std::span<const Vec<T, D>>(from), grid, radius, period, same,
+                                     workers, set);
   std::vector<std::vector<std::int32_t>> lists(from.size());
   for (std::size_t i = 0; i < from.size(); ++i) {
     const auto row = rows.of(i);
@@ -59,9 +60,13 @@ std::vector<std::vector<std::int32_t>> by_cells(const Points<D, T>& from, const 
 template <int D, class T>
 void expect_equal_to_brute_force(const Points<D, T>& points, double radius,
                                  const Periodicity<D>& period, const std::string& what) {
-  EXPECT_EQ((by_cells<D, T>(points, points, radius, period, true)),
-            (brute_force<D, T>(points, points, radius, period, true)))
-      << what << ", D " << D << ", size of a coordinate " << sizeof(T);
+  const auto expected = brute_force<D, T>(points, points, radius, period, true);
+  for (const auto set : {InstructionSet::baseline, InstructionSet::v3, InstructionSet::v4}) {
+    if (set > best_instruction_set()) continue;
+    EXPECT_EQ((by_cells<D, T>(points, points, radius, period, true, 1, set)), expected)
+        << what << ", D " << D << ", size of a coordinate " << sizeof(T) << ", "
+        << name_of(set);
+  }
 }
 
 template <int D, class T>

@@ -35,6 +35,30 @@ TEST(Walls, AreNumberedLeftRightBottomTop) {
   EXPECT_DOUBLE_EQ(distance_inside(walls[3], x), 0.02);
 }
 
+TEST(Walls, AreAllClearOfTheBoxBetweenThem) {
+  const Scenario closed = resolved(scenes::box());
+  const Box<2> box = clear_of_walls<2>(domain_walls(closed));
+  EXPECT_EQ(box.lower, (Vec<double, 2>(closed.domain.left, 0)));
+  EXPECT_EQ(box.upper, (Vec<double, 2>(closed.domain.left + closed.domain.width,
+                                       closed.domain.height)));
+  Scenario tank = scenes::tank();
+  tank.domain.sides = Boundary::periodic;
+  tank.domain.top = Boundary::free;
+  const Box<2> open = clear_of_walls<2>(domain_walls(resolved(tank)));
+  EXPECT_TRUE(std::isinf(open.lower[0]) && std::isinf(open.upper[0]) && std::isinf(open.upper[1]));
+  EXPECT_EQ(open.lower[1], 0);
+  // A round pipe of radius 2 about (1, 3): the corners lie inside, and not far from the wall.
+  const std::vector<Wall> pipe = {
+      {wall_pipe, Boundary::no_slip, 1, 0.0, 1.0, 0.0, 2.0, 1.0, 3.0}};
+  const Box<3> inside = clear_of_walls<3>(pipe);
+  for (const double x : {inside.lower[0], inside.upper[0]})
+    for (const double z : {inside.lower[2], inside.upper[2]}) {
+      const double distance = distance_inside<3>(pipe[0], {x, 7, z});
+      EXPECT_GT(distance, 0);
+      EXPECT_LT(distance, 0.05);
+    }
+}
+
 TEST(Walls, PeriodicSidesAndAFreeTopAreNone) {
   Scenario s = scenes::tank();
   s.domain.sides = Boundary::periodic;
