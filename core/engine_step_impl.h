@@ -145,6 +145,8 @@ SweepData<D, P> Engine<D, P>::sweep_data() {
   s.mass = state_.fluid.mass.data();
   s.superficial_density = state_.fluid.superficial_density.data();
   s.porosity = two_way() ? work_.floored_porosity.data() : nullptr;
+  s.volume_before = work_.volume_before.data();
+  s.density_before = work_.density_before.data();
   s.records = work_.records.data();
   s.fluid = lists_.fluid();
   s.walls = lists_.walls();
@@ -219,7 +221,7 @@ void Engine<D, P>::update_records() {
 
 template <int D, class P>
 void Engine<D, P>::find_density_and_pressure() {
-  fill_records();
+  if (sweeps_.reads_records) fill_records();
   const SweepData<D, P> data = sweep_data();
   workers_.run((data.count + lanes - 1) / lanes, 4,
                [&](std::size_t begin, std::size_t end, unsigned) {
@@ -245,7 +247,7 @@ void Engine<D, P>::find_wall_values() {
 
 template <int D, class P>
 void Engine<D, P>::find_stresses() {
-  update_records();
+  if (sweeps_.reads_records) update_records();
   const SweepData<D, P> data = sweep_data();
   workers_.run((data.count + lanes - 1) / lanes, 4,
                [&](std::size_t begin, std::size_t end, unsigned) {

@@ -44,13 +44,13 @@ inline __attribute__((always_inline)) Lane<T> gather(const T* data, const std::i
   return value;
 }
 
-/// Entries of `record_length`-component records at the lanes' indices, all components at once.
+#ifdef __AVX512F__
+/// All components of records at the lanes' indices. Records are as long as a vector: each is loaded
+/// whole, then rows are turned into columns, which costs a third of what loading every number by
+/// itself does. (Narrower vectors gain nothing by it.)
 template <class T>
 inline __attribute__((always_inline)) void gather_records(const T* data, const std::int32_t* index,
                                                           Lane<T>* component) {
-#ifdef __AVX512F__
-  // Records are as long as a vector: load each whole, then turn rows into columns, which costs a
-  // third of what loading every number by itself does.
   static_assert(record_length == lanes);
   Lane<T> row[lanes];
   for (std::size_t l = 0; l < lanes; ++l)
@@ -73,11 +73,8 @@ inline __attribute__((always_inline)) void gather_records(const T* data, const s
     component[4 + odd] = __builtin_shufflevector(high01, high23, 0, 1, 4, 5, 8, 9, 12, 13);
     component[6 + odd] = __builtin_shufflevector(high01, high23, 2, 3, 6, 7, 10, 11, 14, 15);
   }
-#else
-  for (std::size_t c = 0; c < record_length; ++c)
-    component[c] = gather(data, index, record_length, static_cast<int>(c));
-#endif
 }
+#endif
 
 template <class To, class From>
 inline __attribute__((always_inline)) Lane<To> narrow(Lane<From> value) {

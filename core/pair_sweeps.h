@@ -19,9 +19,9 @@ namespace varve::core {
 
 inline constexpr std::size_t lanes = 8;
 
-/// What pairs ask of a particle, side by side in memory, so that a neighbour costs one cache line:
-/// its position where that has the numbers' type, its velocity, then two numbers that differ from
-/// sweep to sweep.
+/// What pairs ask of a particle, side by side in memory, so that a neighbour costs one load of a
+/// vector as long: its position where that has the numbers' type, its velocity, then two numbers
+/// that differ from sweep to sweep. Only for loops that have such vectors.
 inline constexpr std::size_t record_length = 8;
 template <class Real>
 struct alignas(record_length * sizeof(Real)) PairRecord {
@@ -53,8 +53,10 @@ struct SweepData {
   const Real* mass = nullptr;             // [kg]
   const Real* superficial_density = nullptr;  // rhob(n)
   const Real* porosity = nullptr;         // floored; nullptr: 1 everywhere
-  /// Of the fluid. The two numbers are, for `density`, rho(n) = rhob / eps and m / rhob(n); for
-  /// `stress`, `push` and `volume`.
+  const Real* volume_before = nullptr;    // m / rhob(n)
+  const Real* density_before = nullptr;   // rho(n) = rhob / eps
+  /// The same once more, where `reads_records`. The two numbers are density_before and
+  /// volume_before for `density`, push and volume for `stress`.
   const PairRecord<Real>* records = nullptr;
   GroupedLists fluid, walls;              // of fluid particles: fluid and dummy candidates
   GroupedLists of_walls;                  // of dummies: fluid candidates
@@ -92,6 +94,7 @@ struct PairSweeps {
   Loop extrapolate = nullptr;    // wall groups: wall_push, wall_velocity
   Loop stress = nullptr;         // fluid groups: stress_force, viscous_force
   Loop artificial = nullptr;     // fluid groups: adds artificial viscosity to stress_force
+  bool reads_records = false;
 };
 
 /// Instruction sets in ascending order of width.

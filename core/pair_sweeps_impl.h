@@ -63,7 +63,7 @@ inline T power_of_length(T h) {
   return D == 2 ? h * h : h * h * h;
 }
 
-/// Of eight particles: position, velocity and the two numbers of their records.
+/// Of eight particles: position, velocity and two numbers, which the records hold too.
 template <int D, class P>
 struct Particles {
   using Real = typename P::Real;
@@ -71,8 +71,11 @@ struct Particles {
   Lane<Position> x[D];
   Lane<Real> v[D], first, second;
 
-  inline __attribute__((always_inline)) Particles(const SweepData<D, P>& s,
+  inline __attribute__((always_inline)) Particles(const SweepData<D, P>& s, const Real* firsts,
+                                                  const Real* seconds,
                                                   const std::int32_t* index) {
+#ifdef __AVX512F__
+    static_cast<void>(firsts), static_cast<void>(seconds);
     Lane<Real> number[record_length];
     gather_records(s.records[0].number, index, number);
     for (int c = 0; c < D; ++c) {
@@ -84,6 +87,14 @@ struct Particles {
     }
     first = number[record_first<D, P>];
     second = number[record_first<D, P> + 1];
+#else
+    for (int c = 0; c < D; ++c) {
+      x[c] = gather(s.position, index, D, c);
+      v[c] = gather(s.velocity, index, D, c);
+    }
+    first = gather(firsts, index, 1, 0);
+    second = gather(seconds, index, 1, 0);
+#endif
   }
 };
 
@@ -154,12 +165,12 @@ void density_loop(const SweepData<D, P>& s, std::size_t group_begin, std::size_t
   const Real stiffness = s.sound_speed * s.sound_speed;
   for (std::size_t g = group_begin; g < group_end; ++g) {
     const OwnIndex own(g, s.count);
-    const Particles<D, P> here(s, own.index);
+    const Particles<D, P> here(s, s.density_before, s.volume_before, own.index);
     Lane<Real> divergence{}, spread{};
     Separation<D, P> pair;
     for (std::uint32_t k = s.fluid.start[g]; k < s.fluid.start[g + 1]; ++k) {
       const std::int32_t* j = s.fluid.index + std::size_t(k) * lanes;
-      const Particles<D, P> there(s, j);
+      const Particles<D, P> there(s, s.density_before, s.volume_before, j);
       pair.template set<periodic>(here.x, there.x, s.period, inverse_h);
       Lane<Real> approach{}, drop = here.first - there.first;
       for (int c = 0; c < D; ++c) {
@@ -266,7 +277,7 @@ void stress_loop(const SweepData<D, P>& s, std::size_t group_begin, std::size_t 
   const Real viscous = Real(2) * s.viscosity;
   for (std::size_t g = group_begin; g < group_end; ++g) {
     const OwnIndex own(g, s.count);
-    const Particles<D, P> here(s, own.index);
+    const Particles<D, P> here(s, s.push, s.volume, own.index);
     Lane<Real> force[D] = {}, shear[D] = {};
     const auto add = [&](Lane<Real> push, Lane<Real> drag, int c, Lane<Real> other) {
       if constexpr (conjugate) {
@@ -279,7 +290,7 @@ void stress_loop(const SweepData<D, P>& s, std::size_t group_begin, std::size_t 
     Separation<D, P> pair;
     for (std::uint32_t k = s.fluid.start[g]; k < s.fluid.start[g + 1]; ++k) {
       const std::int32_t* j = s.fluid.index + std::size_t(k) * lanes;
-      const Particles<D, P> there(s, j);
+      const Particles<D, P> there(s, s.push, s.volume, j);
       pair.template set<periodic>(here.x, there.x, s.period, inverse_h);
       const Lane<Real> weight = there.second * kernel_slope<K, Real>(pair.q);
       const Lane<Real> push = -(here.first + there.first) * weight;
@@ -371,11 +382,17 @@ void artificial_loop(const SweepData<D, P>& s, std::size_t group_begin, std::siz
   }
 }
 
+#ifdef __AVX512F__
+constexpr bool reads_records = true;
+#else
+constexpr bool reads_records = false;
+#endif
+
 template <int D, class P, Kernel K, bool periodic>
 PairSweeps<D, P> sweeps_of(bool conjugate) {
   return {density_loop<D, P, K, periodic>, extrapolate_loop<D, P, K, periodic>,
           conjugate ? stress_loop<D, P, K, periodic, true> : stress_loop<D, P, K, periodic, false>,
-          artificial_loop<D, P, K, periodic>};
+          artificial_loop<D, P, K, periodic>, reads_records};
 }
 
 template <int D, class P, Kernel K>
