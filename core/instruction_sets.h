@@ -1,8 +1,18 @@
 // Hot loops exist once per instruction set, in namespaces of their own; the processor chooses at
-// run time. These two say so once for all loops.
+// run time.
 #pragma once
 
-#include "core/pair_sweeps.h"
+#include <string_view>
+
+namespace varve::core {
+
+/// Instruction sets in ascending order of width.
+enum class InstructionSet { baseline, v3, v4 };
+std::string_view name_of(InstructionSet set);
+/// The widest set that this build holds and this processor has.
+InstructionSet best_instruction_set();
+
+}  // namespace varve::core
 
 // VARVE_DECLARE_FOR_ALL_SETS(declaration) declares a function in each of the namespaces;
 // VARVE_OF_SET(set, call) calls that of one set.

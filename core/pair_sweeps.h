@@ -10,8 +10,8 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <string_view>
 
+#include "core/instruction_sets.h"
 #include "core/kernel_names.h"
 #include "core/state.h"
 
@@ -96,12 +96,6 @@ struct PairSweeps {
   Loop artificial = nullptr;     // fluid groups: adds artificial viscosity to stress_force
   bool reads_records = false;
 };
-
-/// Instruction sets in ascending order of width.
-enum class InstructionSet { baseline, v3, v4 };
-std::string_view name_of(InstructionSet set);
-/// The widest set that this build holds and this processor has.
-InstructionSet best_instruction_set();
 
 template <int D, class P>
 PairSweeps<D, P> pair_sweeps(Kernel kernel, bool periodic, bool conjugate, InstructionSet set);
