@@ -63,11 +63,9 @@ void CouplingStage<D, P>::rebuild(const Constants<D>& c, const State<D, P>& stat
   // The coupling's support is wider than the fluid's: cells of its own, or Rc would be cut short.
   CellGrid<D, Position> cells;
   cells.build(fluid, radius, c.period);
-  fluid_of_ = candidates<D, Position>(grains, cells, radius, c.period, false, workers,
-                                       set_);
+  fluid_of_ = candidates<D, Position>(grains, cells, radius, c.period, false, workers, set_);
   cells.build(grains, radius, c.period);
-  grains_of_ = candidates<D, Position>(grains, cells, radius, c.period, true, workers,
-                                        set_);
+  grains_of_ = candidates<D, Position>(grains, cells, radius, c.period, true, workers, set_);
   weights_.assign(fluid_of_.index.size(), 0);
   pushes_.clear();
   pressure_force_.clear();

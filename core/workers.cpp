@@ -86,9 +86,10 @@ void Workers::serve(unsigned thread) {
   std::uint32_t seen = 0;
   while (true) {
     generation_.wait(seen, std::memory_order_acquire);
-    if (stopping_) return;
-    // Others may have done a task, or several, before this thread woke up.
+    // Others may have done a task, or several, before this thread woke up. Asked after that: the
+    // last number is the end's, of which there is no task, and who sees it sees `stopping_` too.
     seen = generation_.load(std::memory_order_acquire);
+    if (stopping_) return;
     take_parts(thread, seen);
   }
 }

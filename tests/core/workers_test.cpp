@@ -99,6 +99,18 @@ TEST(Workers, OnEachRunsOnAllThreads) {
   EXPECT_EQ(threads.size(), 5u);
 }
 
+TEST(Workers, ThatEndWhileOneIsLateDoNothingAgain) {
+  for (int again = 0; again < 2000; ++again) {
+    std::atomic<std::size_t> done = 0;
+    {
+      Workers workers(3);
+      workers.run(12, 1,
+                  [&](std::size_t begin, std::size_t end, unsigned) { done += end - begin; });
+    }
+    ASSERT_EQ(done, 12u);
+  }
+}
+
 TEST(Workers, ThrowTheExceptionOfTheFirstPartAndGoOn) {
   Workers workers(3);
   for (int again = 0; again < 20; ++again) {
