@@ -1,22 +1,18 @@
 // varve study: sensitivity studies made of runs and forks, from a study file to a report.
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
-#include <cstring>
 #include <filesystem>
 #include <map>
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
-#include <sys/file.h>
-#include <unistd.h>
 
 #include "tools/cli.h"
 #include "tools/progress.h"
 #include "tools/session.h"
 #include "tools/study_estimate.h"
 #include "tools/study_format.h"
+#include "tools/study_lock.h"
 #include "tools/study_member.h"
 #include "tools/study_plan.h"
 #include "tools/study_pool.h"
@@ -30,26 +26,6 @@ namespace {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
-
-/// One study at a time in one folder.
-class FolderLock {
- public:
-  explicit FolderLock(const std::string& folder) : path_((fs::path(folder) / "lock").string()) {
-    fs::create_directories(folder);
-    file_ = open(path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
-    if (file_ < 0)
-      throw ToolError(exit_output, fmt::format("{}: {}", path_, std::strerror(errno)));
-    if (flock(file_, LOCK_EX | LOCK_NB) != 0)
-      throw UsageError(fmt::format("{}: another varve study is at work here", folder));
-  }
-  ~FolderLock() { close(file_); }
-  FolderLock(const FolderLock&) = delete;
-  FolderLock& operator=(const FolderLock&) = delete;
-
- private:
-  std::string path_;
-  int file_ = -1;
-};
 
 struct Request {
   const Invocation& invocation;

@@ -11,6 +11,7 @@
 #include <sstream>
 #include <thread>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -484,7 +485,8 @@ TEST_F(Study, TwoAtATimeInOneFolderAreRefused) {
   for (int k = 0; k < 1000 && !fs::exists(folder_ / "slow/plan.csv"); ++k)
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   EXPECT_THAT(verb(2, {"study", "run", "slow.study", "--folder", "slow"}, folder_.path()).errors,
-              HasSubstr("another varve study is at work here"));
+              HasSubstr(fmt::format("another varve study is at work here (process {})",
+                                    running.pid())));
   running.signal(SIGTERM);
   running.wait();
 }

@@ -145,6 +145,7 @@ class Background {
   Background(const Background&) = delete;
   Background& operator=(const Background&) = delete;
 
+  pid_t pid() const { return child_; }
   void signal(int number) const { kill(child_, number); }
   /// True once it has ended by itself.
   bool ended() {
