@@ -301,11 +301,13 @@ VARVE_INLINE void tokenise_body(ImageOf<T>* residuals, const Expectation* expect
     const std::uint32_t long_enough = length > offset ? 1 : 0;
     const std::uint32_t fits = symbol < tans_symbols ? long_enough : 0;
     const std::uint32_t written = fits != 0 ? symbol : tans_escape;
-    code[i] = (nonzero != 0 ? written : 0) | (length - nonzero) << 8 | nonzero << 14 | sign << 15;
-  }
-  for (std::size_t i = 0; i < n; ++i) {
-    tokens[i].symbol = static_cast<std::uint8_t>(code[i]);
-    tokens[i].shape = static_cast<std::uint8_t>(code[i] >> 8);
+    const std::uint32_t raw = length - nonzero;
+    const std::uint32_t known = nonzero != 0 ? written : 0;
+    const std::uint32_t column = raw > raw_bits_max ? long_column : known;
+    const std::uint32_t context = expected[i].context & 0x7f;
+    tokens[i].word = (context * table_columns + column) | known << Token::symbol_at |
+                     nonzero << Token::nonzero_at | sign << Token::negative_at |
+                     raw << Token::raw_at;
   }
 }
 

@@ -21,15 +21,36 @@ struct Expectation {
   std::uint8_t offset;
 };
 
-/// How a residual is written (codec_tans.h).
-struct Token {
-  std::uint8_t symbol;
-  std::uint8_t shape;  ///< raw bits behind the symbol; bit 6: not 0; bit 7: negative
-};
-
 /// Symbols of the entropy coder; the one behind which length and sign follow as they are.
 inline constexpr unsigned tans_symbols = 32;
 inline constexpr unsigned tans_escape = 1;
+
+/// Raw bits that fit into one write together with those of a state.
+inline constexpr unsigned raw_bits_max = 46;
+/// Columns of the encoder's table, one row per context: the symbols, the escape's own step, and one
+/// for residuals of more raw bits.
+inline constexpr unsigned escape_column = tans_symbols;
+inline constexpr unsigned long_column = tans_symbols + 1;
+inline constexpr unsigned table_columns = tans_symbols + 2;
+
+/// How a residual is written (codec_tans.h): what the encoder needs of it, in one word.
+struct Token {
+  std::uint32_t word;
+  static constexpr unsigned symbol_at = 12, nonzero_at = 17, negative_at = 18, raw_at = 24;
+
+  /// Entry of the encoder's table: context * table_columns + column.
+  unsigned entry() const { return word & 0xfff; }
+  unsigned symbol() const { return word >> symbol_at & 31; }
+  unsigned context() const { return entry() / table_columns; }
+  unsigned nonzero() const { return word >> nonzero_at & 1; }
+  unsigned negative() const { return word >> negative_at & 1; }
+  /// Number of raw bits behind the symbol.
+  unsigned raw() const { return word >> raw_at; }
+  /// Entry of the escape in the same context.
+  unsigned escape_entry() const {
+    return entry() - (raw() > raw_bits_max ? long_column : symbol()) + escape_column;
+  }
+};
 
 /// Past residuals that a second prediction is made from, and the candidates for it: the residual
 /// itself is expected to be 0, or to continue the past ones as a constant, a line or a parabola.

@@ -58,20 +58,20 @@ void StagedCoder<T>::encode(Track<T>& track, std::span<const std::byte> frame,
     stage_.rebase_levels(step, shifts);
   }
   residuals_.resize(track.values());
-  expected_.resize(track.values());
   tokens_.resize(track.values());
   track.begin_frame();
   track.for_blocks([&](std::size_t first, std::size_t n) {
     std::array<U, block_values> bits;
     std::array<U, block_values> base;
     std::array<U, block_values> predicted;
+    std::array<Expectation, block_values> expected;
     const Kernels<T>& kernel = kernels<T>();
     const StageBlock block = stage_.block(first);
     track.predict(weights, first, n, base.data());
-    kernel.expect(block, base.data(), n, predicted.data(), expected_.data() + first);
+    kernel.expect(block, base.data(), n, predicted.data(), expected.data());
     track.gather(frame, first, n, bits.data());
     kernel.subtract(bits.data(), predicted.data(), n, residuals_.data() + first);
-    kernel.tokenise(residuals_.data() + first, expected_.data() + first, n, tokens_.data() + first);
+    kernel.tokenise(residuals_.data() + first, expected.data(), n, tokens_.data() + first);
     kernel.learn(block, bits.data(), base.data(), n);
     track.advance(bits.data(), first, n);
   });
@@ -92,7 +92,7 @@ void StagedCoder<T>::encode(Track<T>& track, std::span<const std::byte> frame,
     sink.bytes(description_);
     encoder_.set_model(model_);
   }
-  encoder_.encode(residuals_, expected_, tokens_, track.count(), payload);
+  encoder_.encode(residuals_, tokens_, track.count(), payload);
 }
 
 template <class T>
@@ -154,7 +154,7 @@ bool StagedCoder<T>::improve_model(bool fresh) {
   if (due || frames_since_model_ % count_interval == 0) {
     const std::size_t stride = std::max<std::size_t>(1, tokens_.size() / count_values) | 1;
     for (std::size_t i = 0; i < tokens_.size(); i += stride) {
-      ++counts_[expected_[i].context & 0x7f][tokens_[i].symbol];
+      ++counts_[tokens_[i].context()][tokens_[i].symbol()];
     }
     counted_ += tokens_.size() / stride;
   }

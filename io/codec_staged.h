@@ -50,7 +50,6 @@ class StagedCoder {
   std::size_t counted_ = 0;
   std::vector<std::byte> description_;
   std::vector<U> residuals_;  ///< their raw bits, once they are tokens
-  std::vector<Expectation> expected_;
   std::vector<Token> tokens_;
 };
 

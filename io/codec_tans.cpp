@@ -180,13 +180,14 @@ void Model::read(ByteSource& source) {
 
 struct EncodeTables {
   struct Step {
-    std::uint32_t delta_bits = escaped;  ///< (state + delta_bits) >> 16: number of bits to emit
-    std::int32_t delta_state = 0;
+    std::uint32_t delta_bits = special;  ///< (state + delta_bits) >> 16: number of bits to emit
+    std::uint32_t delta_state = 0;       ///< added to the rest of the state: where `next` has it
   };
-  /// Marks symbols without a slot, and the escape itself, whose step comes behind all symbols'.
-  static constexpr std::uint32_t escaped = ~0u;
-  std::array<std::array<Step, tans_symbols + 1>, tans_contexts> step;
-  std::array<std::array<std::uint16_t, tans_states>, tans_contexts> next;
+  /// Marks what takes more than one step: symbols without a slot, the escape among them (its own
+  /// step has a column behind all symbols'), and many raw bits.
+  static constexpr std::uint32_t special = ~0u;
+  std::array<Step, tans_contexts * table_columns> step;  ///< by Token::entry()
+  std::array<std::uint16_t, tans_contexts * tans_states> next;
 };
 
 struct DecodeTables {
@@ -204,21 +205,23 @@ void build(const Model& model, EncodeTables& tables) {
     const auto owner = spread(slots);
     std::array<std::uint32_t, tans_symbols> first{};
     std::uint32_t sum = 0;
-    tables.step[c].fill({});
+    std::fill_n(tables.step.begin() + c * table_columns, table_columns, EncodeTables::Step());
     for (unsigned s = 0; s < tans_symbols; ++s) {
       first[s] = sum;
       if (slots[s] > 0) {
         // A state emits `bits` bits from slots << bits upwards, one less below.
         const auto width = static_cast<unsigned>(std::bit_width(slots[s] - 1u));
         const unsigned bits = slots[s] == 1 ? tans_log : tans_log + 1 - width;
-        EncodeTables::Step& step = tables.step[c][s == tans_escape ? tans_symbols : s];
+        const unsigned column = s == tans_escape ? escape_column : s;
+        EncodeTables::Step& step = tables.step[c * table_columns + column];
         step.delta_bits = (bits << 16) - (static_cast<std::uint32_t>(slots[s]) << bits);
-        step.delta_state = static_cast<std::int32_t>(sum) - slots[s];
+        step.delta_state = c * tans_states + sum - slots[s];  // may wrap around below 0
       }
       sum += slots[s];
     }
     for (unsigned state = 0; state < tans_states; ++state) {
-      tables.next[c][first[owner[state]]++] = static_cast<std::uint16_t>(state + tans_states);
+      tables.next[c * tans_states + first[owner[state]]++] =
+          static_cast<std::uint16_t>(state + tans_states);
     }
   }
 }
@@ -248,11 +251,11 @@ struct BackwardWriter {
   unsigned count = 0;      ///< below 8 between calls
   std::uint32_t state = tans_states;
 
-  /// n <= 56
+  /// n <= 56. With nothing at all to write, what is stored is no part of the stream.
   VARVE_INLINE void put(std::uint64_t value, unsigned n) {
     bits = (bits << n) | value;
     count += n;
-    store64(at - 8, (bits << 1) << (63 - count));
+    store64(at - 8, bits << ((0u - count) & 63));
     at -= count >> 3;
     count &= 7;
   }
@@ -261,48 +264,43 @@ using Writers = std::array<BackwardWriter, tans_streams>;
 
 /// One value: raw bits first, then what an escape needs, then state bits, since all is read
 /// backwards.
-VARVE_INLINE void put_value(const EncodeTables& tables, std::uint64_t raw_bits,
-                            Expectation expected, Token token, BackwardWriter& writer) {
-  constexpr unsigned combined_max = 46;  // raw bits that fit into one put() with the state's
-  const unsigned context = expected.context & 0x7f;
-  unsigned raw = token.shape & 0x3f;
-  EncodeTables::Step step = tables.step[context][token.symbol];
-  const bool escaped = step.delta_bits == EncodeTables::escaped;
-  if (escaped || raw > combined_max) [[unlikely]] {
+VARVE_INLINE void put_value(const EncodeTables& tables, std::uint64_t raw_bits, Token token,
+                            BackwardWriter& writer) {
+  unsigned raw = token.raw();
+  EncodeTables::Step step = tables.step[token.entry()];
+  if (step.delta_bits == EncodeTables::special) [[unlikely]] {
     if (raw > 32) {
       writer.put(raw_bits >> 32, raw - 32);
     }
     writer.put(raw_bits & 0xffffffffu, std::min(raw, 32u));
-    if (escaped) {
-      const unsigned length = raw + (token.shape >> 6 & 1);
-      writer.put(length * 2 + (token.shape >> 7), 8);
-      step = tables.step[context][tans_symbols];
+    step = tables.step[token.escape_entry() - escape_column + token.symbol()];
+    if (step.delta_bits == EncodeTables::special) {
+      writer.put((raw + token.nonzero()) * 2 + token.negative(), 8);
+      step = tables.step[token.escape_entry()];
     }
     raw = 0;
     raw_bits = 0;
   }
   const unsigned bits = (writer.state + step.delta_bits) >> 16;
   const std::uint64_t state_bits = low_bits(writer.state, bits);
-  const auto index = static_cast<std::int32_t>(writer.state >> bits) + step.delta_state;
-  writer.state = tables.next[context][static_cast<std::size_t>(index)];
+  writer.state = tables.next[(writer.state >> bits) + step.delta_state];
   writer.put((raw_bits << bits) | state_bits, raw + bits);
 }
 
 template <class U>
-VARVE_INLINE void put_run_body(const EncodeTables& tables, const U* raw_bits,
-                               const Expectation* expected, const Token* tokens, std::size_t n,
-                               Writers& all) {
+VARVE_INLINE void put_run_body(const EncodeTables& tables, const U* raw_bits, const Token* tokens,
+                               std::size_t n, Writers& all) {
   BackwardWriter w0 = all[0], w1 = all[1], w2 = all[2], w3 = all[3];
   std::size_t i = n;
   for (; i % tans_streams != 0; --i) {
     BackwardWriter& writer = i % tans_streams == 3 ? w2 : i % tans_streams == 2 ? w1 : w0;
-    put_value(tables, raw_bits[i - 1], expected[i - 1], tokens[i - 1], writer);
+    put_value(tables, raw_bits[i - 1], tokens[i - 1], writer);
   }
   for (; i > 0; i -= tans_streams) {
-    put_value(tables, raw_bits[i - 1], expected[i - 1], tokens[i - 1], w3);
-    put_value(tables, raw_bits[i - 2], expected[i - 2], tokens[i - 2], w2);
-    put_value(tables, raw_bits[i - 3], expected[i - 3], tokens[i - 3], w1);
-    put_value(tables, raw_bits[i - 4], expected[i - 4], tokens[i - 4], w0);
+    put_value(tables, raw_bits[i - 1], tokens[i - 1], w3);
+    put_value(tables, raw_bits[i - 2], tokens[i - 2], w2);
+    put_value(tables, raw_bits[i - 3], tokens[i - 3], w1);
+    put_value(tables, raw_bits[i - 4], tokens[i - 4], w0);
   }
   all = {w0, w1, w2, w3};
 }
@@ -369,8 +367,7 @@ VARVE_INLINE bool take_rows_body(const DecodeTables& tables, const std::byte* da
 }
 
 template <class U>
-using PutRun = void (*)(const EncodeTables&, const U*, const Expectation*, const Token*,
-                        std::size_t, Writers&);
+using PutRun = void (*)(const EncodeTables&, const U*, const Token*, std::size_t, Writers&);
 template <class U>
 using TakeRows = bool (*)(const DecodeTables&, const std::byte*, const Expectation*, std::size_t,
                           const std::uint64_t*, BitReader*, U*);
@@ -379,9 +376,8 @@ using TakeRows = bool (*)(const DecodeTables&, const std::byte*, const Expectati
   template <class U>                                                                              \
   struct NAME {                                                                                   \
     TARGET static void put_run(const EncodeTables& tables, const U* raw_bits,                     \
-                               const Expectation* expected, const Token* tokens, std::size_t n,   \
-                               Writers& writers) {                                                \
-      put_run_body<U>(tables, raw_bits, expected, tokens, n, writers);                            \
+                               const Token* tokens, std::size_t n, Writers& writers) {            \
+      put_run_body<U>(tables, raw_bits, tokens, n, writers);                                      \
     }                                                                                             \
     TARGET static bool take_rows(const DecodeTables& tables, const std::byte* data,               \
                                  const Expectation* expected, std::size_t n,                      \
@@ -442,9 +438,8 @@ void TansEncoder<U>::set_model(const Model& model) {
 }
 
 template <class U>
-void TansEncoder<U>::encode(std::span<const U> raw_bits, std::span<const Expectation> expected,
-                            std::span<const Token> tokens, std::size_t run,
-                            std::vector<std::byte>& out) {
+void TansEncoder<U>::encode(std::span<const U> raw_bits, std::span<const Token> tokens,
+                            std::size_t run, std::vector<std::byte>& out) {
   constexpr std::size_t value_bytes_max = 11;  // 9 state bits, 8 of an escape, 63 raw ones
   Writers writers;
   const std::size_t runs = run == 0 ? 0 : raw_bits.size() / run;
@@ -458,8 +453,7 @@ void TansEncoder<U>::encode(std::span<const U> raw_bits, std::span<const Expecta
     writers[k].at = buffer_.get() + (k + 1) * room;
   }
   for (std::size_t r = runs; r-- > 0;) {
-    put_run<U>()(*tables_, raw_bits.data() + r * run, expected.data() + r * run,
-                 tokens.data() + r * run, run, writers);
+    put_run<U>()(*tables_, raw_bits.data() + r * run, tokens.data() + r * run, run, writers);
   }
   std::array<std::size_t, tans_streams> sizes{};
   std::size_t sum = 0;

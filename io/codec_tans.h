@@ -57,8 +57,8 @@ class TansEncoder {
   void set_model(const Model& model);
   /// Appends the four streams. The values come in runs of `run`, coded one after the other; stream
   /// k takes values k, k+4, k+8 ... of each run.
-  void encode(std::span<const U> raw_bits, std::span<const Expectation> expected,
-              std::span<const Token> tokens, std::size_t run, std::vector<std::byte>& out);
+  void encode(std::span<const U> raw_bits, std::span<const Token> tokens, std::size_t run,
+              std::vector<std::byte>& out);
 
  private:
   std::unique_ptr<EncodeTables> tables_;

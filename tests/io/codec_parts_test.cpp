@@ -178,9 +178,12 @@ std::vector<std::byte> run_kernels(const Kernels<T>& kernel, std::uint64_t seed,
     kernel.subtract(bits.data(), predicted.data(), n, residuals.data());
     kernel.tokenise(residuals.data(), expected.data(), n, tokens.data());
     keep(residuals);
-    for (const Token& token : tokens) {
-      result.push_back(static_cast<std::byte>(token.symbol));
-      result.push_back(static_cast<std::byte>(token.shape));
+    for (std::size_t i = 0; i < n; ++i) {
+      const Token token = tokens[i];
+      EXPECT_EQ(token.context(), expected[i].context & 0x7f);
+      result.push_back(static_cast<std::byte>(token.symbol() | token.nonzero() << 5 |
+                                              token.negative() << 6));
+      result.push_back(static_cast<std::byte>(token.raw()));
     }
     kernel.learn(block, bits.data(), image.data(), n);
     keep(past[3]);
@@ -268,14 +271,14 @@ void code_and_decode(std::uint64_t seed) {
   }
   SymbolCounts counts{};
   for (std::size_t i = 0; i < residuals.size(); i += 2) {
-    ++counts[expected[i].context & 0x7f][tokens[i].symbol];
+    ++counts[expected[i].context & 0x7f][tokens[i].symbol()];
   }
   Model model;
   model.fit(counts);
   TansEncoder<U> encoder;
   encoder.set_model(model);
   std::vector<std::byte> bytes;
-  encoder.encode(raw_bits, expected, tokens, run, bytes);
+  encoder.encode(raw_bits, tokens, run, bytes);
   TansDecoder<U> decoder;
   decoder.set_model(model);
   const std::string name = "f";
