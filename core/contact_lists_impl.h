@@ -169,7 +169,7 @@ void Contacts<D, P>::build_list(const Step& step, const GrainState<D, P>& grains
   double reach = 0;
   for (const ContactPair& pair : c.pairs) reach = std::max(reach, pair.sight + skin);
   const std::span<const Vec<Position, D>> points(grains.position);
-  cells_.build(points, reach, c.period);
+  cells_.build(points, reach, c.period, step.workers);
   find_candidates<D, Position>(points, cells_, reach, c.period, true, step.workers, set_, parts_,
                                rows_);
   const auto species = static_cast<std::uint32_t>(c.species.size());

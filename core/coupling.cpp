@@ -61,11 +61,12 @@ void CouplingStage<D, P>::rebuild(const Constants<D>& c, const State<D, P>& stat
   const std::span<const Vec<Position, D>> grains(state.grains.position);
   const std::span<const Vec<Position, D>> fluid(state.fluid.position);
   // The coupling's support is wider than the fluid's: cells of its own, or Rc would be cut short.
-  CellGrid<D, Position> cells;
-  cells.build(fluid, radius, c.period);
-  fluid_of_ = candidates<D, Position>(grains, cells, radius, c.period, false, workers, set_);
-  cells.build(grains, radius, c.period);
-  grains_of_ = candidates<D, Position>(grains, cells, radius, c.period, true, workers, set_);
+  cells_.build(fluid, radius, c.period, workers);
+  find_candidates<D, Position>(grains, cells_, radius, c.period, false, workers, set_, parts_,
+                               fluid_of_);
+  cells_.build(grains, radius, c.period, workers);
+  find_candidates<D, Position>(grains, cells_, radius, c.period, true, workers, set_, parts_,
+                               grains_of_);
   weights_.assign(fluid_of_.index.size(), 0);
   pushes_.clear();
   pressure_force_.clear();

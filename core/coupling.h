@@ -152,6 +152,8 @@ class CouplingStage {
                          const FluidView<D, P>& fluid, const DragLaw<D>& law, std::size_t i) const;
 
   Rows fluid_of_, grains_of_;  // per grain
+  CellGrid<D, Position> cells_;  // kept for their memory, as the parts
+  RowParts parts_;
   std::vector<Wall> walls_;
   std::vector<Vec<Position, D>> listed_at_;  // grains
   std::size_t listed_fluid_ = 0;

@@ -38,13 +38,13 @@ void FluidLists<D, Position>::rebuild(std::span<const Vec<Position, D>> fluid,
     find_candidates<D, Position>(from, cells, radius, period, same, workers, set_, parts_,
                                  rows);
   };
-  fluid_cells_.build(fluid, radius, period);
+  fluid_cells_.build(fluid, radius, period, workers);
   find(fluid, fluid_cells_, true, rows_);
   fluid_.assign(rows_, fluid.size(), Filler::own_index, 0, workers);
-  wall_cells_.build(walls, radius, period);
-  find(fluid, wall_cells_, false, rows_);
-  walls_.assign(rows_, fluid.size(), Filler::one_past, static_cast<std::int32_t>(walls.size()),
-                workers);
+  wall_cells_.build(walls, radius, period, workers);
+  find(fluid, wall_cells_, false, rows_near_walls_);
+  walls_.assign(rows_near_walls_, fluid.size(), Filler::one_past,
+                static_cast<std::int32_t>(walls.size()), workers);
   find(walls, fluid_cells_, false, wall_rows_);
   of_walls_.assign(wall_rows_, walls.size(), Filler::minus_one, 0, workers);
   listed_at_.assign(fluid.begin(), fluid.end());

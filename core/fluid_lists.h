@@ -29,9 +29,11 @@ class FluidLists {
  private:
   InstructionSet set_;
   GroupedStorage fluid_, walls_, of_walls_;
-  Rows wall_rows_, rows_;
+  Rows wall_rows_;
+  // Kept for their memory, each for one use: what grows again is filled with zeros.
+  Rows rows_, rows_near_walls_;
   RowParts parts_;
-  CellGrid<D, Position> fluid_cells_, wall_cells_;  // kept for their memory
+  CellGrid<D, Position> fluid_cells_, wall_cells_;
   std::vector<Vec<Position, D>> listed_at_;
 };
 

@@ -131,7 +131,7 @@ class Packing {
     const double reach = 2 * most * size * 1.25;
     Workers alone(1);
     CellGrid<D, double> cells;
-    cells.build(x_, reach, period_);
+    cells.build(x_, reach, period_, alone);
     rows_ = candidates<D, double>(std::span<const Vec<double, D>>(x_), cells, reach, period_, true,
                                   alone);
   }
@@ -242,7 +242,7 @@ std::string misplaced(const Scenario& s, const std::vector<ListedGrain>& grains)
   const double reach = largest_diameter(s);
   Workers alone(1);
   CellGrid<D, double> cells;
-  cells.build(points, reach, period);
+  cells.build(points, reach, period, alone);
   const Rows rows = candidates<D, double>(std::span<const Vec<double, D>>(points), cells, reach,
                                           period, true, alone);
   for (std::size_t i = 0; i < points.size(); ++i)

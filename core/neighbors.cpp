@@ -15,33 +15,54 @@ std::int64_t CellGrid<D, Position>::cell_along(double x, int axis) const {
 
 namespace {
 
-/// Least and largest finite coordinate along an axis; 0 and 0 if there is none.
-template <int D, class Position>
-void bounds(std::span<const Vec<Position, D>> points, int axis, double& low, double& high) {
-  bool first = true;
-  for (const auto& p : points) {
-    const double x = static_cast<double>(p[axis]);
-    if (!std::isfinite(x)) continue;
-    low = first ? x : std::min(low, x);
-    high = first ? x : std::max(high, x);
-    first = false;
+/// Points that one thread takes at a time; fewer are not worth waking another.
+constexpr std::size_t points_grain = 2048;
+
+/// Least and largest finite coordinates; 0 and 0 where there are none.
+template <int D>
+struct Bounds {
+  double low[D] = {}, high[D] = {};
+  bool any[D] = {};
+
+  void include(double x, int axis) {
+    low[axis] = any[axis] ? std::min(low[axis], x) : x;
+    high[axis] = any[axis] ? std::max(high[axis], x) : x;
+    any[axis] = true;
   }
+};
+
+template <int D, class Position>
+Bounds<D> bounds_of(std::span<const Vec<Position, D>> points, Workers& workers) {
+  std::vector<Bounds<D>> of_parts(workers.parts());
+  workers.run(points.size(), points_grain, [&](std::size_t begin, std::size_t end, unsigned part) {
+    Bounds<D> bounds;
+    for (std::size_t i = begin; i < end; ++i)
+      for (int a = 0; a < D; ++a)
+        if (const auto x = static_cast<double>(points[i][a]); std::isfinite(x))
+          bounds.include(x, a);
+    of_parts[part] = bounds;
+  });
+  Bounds<D> all;
+  for (const Bounds<D>& part : of_parts)
+    for (int a = 0; a < D; ++a)
+      if (part.any[a]) {
+        all.include(part.low[a], a);
+        all.include(part.high[a], a);
+      }
+  return all;
 }
 
 }  // namespace
 
 template <int D, class Position>
-void CellGrid<D, Position>::build(std::span<const Vec<Position, D>> points, double cell,
-                                  const Periodicity<D>& period) {
+void CellGrid<D, Position>::choose_cells(std::span<const Vec<Position, D>> points, double cell,
+                                         const Periodicity<D>& period, Workers& workers) {
+  const Bounds<D> bounds = bounds_of<D, Position>(points, workers);
   double low[D] = {}, high[D] = {}, cells[D] = {};
   for (int a = 0; a < D; ++a) {
     periodic_[a] = period.length[a] > 0;
-    if (periodic_[a]) {
-      low[a] = period.origin[a];
-      high[a] = low[a] + period.length[a];
-    } else {
-      bounds(points, a, low[a], high[a]);
-    }
+    low[a] = periodic_[a] ? period.origin[a] : bounds.low[a];
+    high[a] = periodic_[a] ? low[a] + period.length[a] : bounds.high[a];
     cells[a] = std::clamp(std::floor((high[a] - low[a]) / cell), 1.0, 1e9);
   }
   // Points that have run away must not cost memory: no more cells than a few per point.
@@ -56,33 +77,44 @@ void CellGrid<D, Position>::build(std::span<const Vec<Position, D>> points, doub
     double* const longest = std::max_element(cells, cells + D);
     *longest = std::max(1.0, std::floor(0.5 * *longest));
   }
-  const auto total = static_cast<std::size_t>(number());
   for (int a = 0; a < D; ++a) {
     size_[a] = static_cast<std::int64_t>(cells[a]);
     origin_[a] = low[a];
     inverse_cell_[a] = high[a] > low[a] ? cells[a] / (high[a] - low[a]) : 0;
   }
+  start_.assign(static_cast<std::size_t>(number()) + 1, 0);
+}
+
+template <int D, class Position>
+void CellGrid<D, Position>::build(std::span<const Vec<Position, D>> points, double cell,
+                                  const Periodicity<D>& period, Workers& workers) {
+  choose_cells(points, cell, period, workers);
   cell_of_.resize(points.size());
-  start_.assign(total + 1, 0);
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    std::int64_t index = 0;
-    for (int a = D - 1; a >= 0; --a)
-      index = index * size_[a] + cell_along(static_cast<double>(points[i][a]), a);
-    cell_of_[i] = static_cast<std::uint32_t>(index);
-    ++start_[cell_of_[i] + 1];
-  }
-  for (std::size_t c = 0; c < total; ++c) start_[c + 1] += start_[c];
+  workers.run(points.size(), points_grain, [&](std::size_t begin, std::size_t end, unsigned) {
+    for (std::size_t i = begin; i < end; ++i) {
+      std::int64_t index = 0;
+      for (int a = D - 1; a >= 0; --a)
+        index = index * size_[a] + cell_along(static_cast<double>(points[i][a]), a);
+      cell_of_[i] = static_cast<std::uint32_t>(index);
+    }
+  });
+  for (const std::uint32_t cell_of : cell_of_) ++start_[cell_of + 1];
   fullest_ = 0;
-  for (std::size_t c = 0; c < total; ++c)
-    fullest_ = std::max<std::size_t>(fullest_, start_[c + 1] - start_[c]);
-  ids_.resize(points.size() + lanes);
-  for (auto& axis : coordinates_) axis.resize(points.size() + lanes);
-  next_.assign(start_.begin(), start_.end() - 1);
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const std::uint32_t place = next_[cell_of_[i]]++;
-    ids_[place] = static_cast<std::int32_t>(i);
-    for (int a = 0; a < D; ++a) coordinates_[a][place] = static_cast<double>(points[i][a]);
+  for (std::size_t c = 0; c + 1 < start_.size(); ++c) {
+    fullest_ = std::max<std::size_t>(fullest_, start_[c + 1]);
+    start_[c + 1] += start_[c];
   }
+  ids_.resize(points.size() + lanes);
+  next_.assign(start_.begin(), start_.end() - 1);
+  for (std::size_t i = 0; i < points.size(); ++i)
+    ids_[next_[cell_of_[i]]++] = static_cast<std::int32_t>(i);
+  for (auto& axis : coordinates_) axis.resize(points.size() + lanes);
+  workers.run(points.size(), points_grain, [&](std::size_t begin, std::size_t end, unsigned) {
+    for (std::size_t place = begin; place < end; ++place) {
+      const Vec<Position, D>& point = points[static_cast<std::size_t>(ids_[place])];
+      for (int a = 0; a < D; ++a) coordinates_[a][place] = static_cast<double>(point[a]);
+    }
+  });
 }
 
 template <int D, class Position>

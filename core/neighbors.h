@@ -33,7 +33,8 @@ class CellGrid {
  public:
   /// Cells no smaller than `cell` [m]. Along a periodic axis the cells divide the period. Points
   /// with a coordinate that is not finite are put in the first cell.
-  void build(std::span<const Vec<Position, D>> points, double cell, const Periodicity<D>& period);
+  void build(std::span<const Vec<Position, D>> points, double cell, const Periodicity<D>& period,
+             Workers& workers);
 
   /// Where the points within one cell of `point` are in the cell-ordered arrays, each once, in no
   /// particular order of id; returns how many stretches these are.
@@ -48,6 +49,8 @@ class CellGrid {
 
  private:
   std::int64_t cell_along(double x, int axis) const;
+  void choose_cells(std::span<const Vec<Position, D>> points, double cell,
+                    const Periodicity<D>& period, Workers& workers);
 
   double origin_[D] = {}, inverse_cell_[D] = {};
   std::int64_t size_[D] = {};

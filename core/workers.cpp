@@ -73,7 +73,8 @@ void Workers::execute(const Task& task) {
   const std::uint32_t generation = generation_.fetch_add(1, std::memory_order_release) + 1;
   generation_.notify_all();
   take_parts(0, generation);
-  while (const std::uint32_t left = undone_.load(std::memory_order_acquire)) undone_.wait(left);
+  if (!patience_.look([this] { return undone_.load(std::memory_order_acquire) == 0; }))
+    while (const std::uint32_t left = undone_.load(std::memory_order_acquire)) undone_.wait(left);
   for (std::exception_ptr& failure : failures_)
     if (failure) {
       const std::exception_ptr first = failure;
@@ -84,8 +85,10 @@ void Workers::execute(const Task& task) {
 
 void Workers::serve(unsigned thread) {
   std::uint32_t seen = 0;
+  Patience patience;
   while (true) {
-    generation_.wait(seen, std::memory_order_acquire);
+    if (!patience.look([&] { return generation_.load(std::memory_order_acquire) != seen; }))
+      generation_.wait(seen, std::memory_order_acquire);
     // Others may have done a task, or several, before this thread woke up. Asked after that: the
     // last number is the end's, of which there is no task, and who sees it sees `stopping_` too.
     seen = generation_.load(std::memory_order_acquire);

@@ -1,6 +1,6 @@
-// A fixed set of threads that share out ranges and wait by blocking. Results never depend on their
-// number, nor on who does what: every range item writes only its own values, and nothing is summed
-// across threads.
+// A fixed set of threads that share out ranges and wait by blocking, after a short look (Patience).
+// Results never depend on their number, nor on who does what: every range item writes only its own
+// values, and nothing is summed across threads.
 //
 // A range is divided into parts, a few per thread. A thread takes its own first, then whatever
 // nobody has begun: where one is late, because it has yet to wake up or its core is busy with
@@ -14,6 +14,8 @@
 #include <thread>
 #include <type_traits>
 #include <vector>
+
+#include "core/patience.h"
 
 namespace varve::core {
 
@@ -74,8 +76,9 @@ class Workers {
   std::vector<std::atomic<std::uint32_t>> taken_;
   Task task_;
   // The number of the task, for which threads wait, and its parts that are not done, for which the
-  // caller waits, both asleep in the kernel.
+  // caller waits, both asleep in the kernel if it takes long.
   std::atomic<std::uint32_t> generation_ = 0, undone_ = 0;
+  Patience patience_;  // the caller's
   std::atomic<bool> stopping_ = false;
 };
 

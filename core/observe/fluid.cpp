@@ -22,7 +22,7 @@ void sample_with(const FluidPoints& fluid, std::span<const double> points,
   for (int k = 0; k < D; ++k) period.length[k] = fluid.period[static_cast<std::size_t>(k)];
   Workers alone(1);
   CellGrid<D, double> cells;
-  cells.build(particles, kernel.support(), period);
+  cells.build(particles, kernel.support(), period, alone);
   const Rows near = candidates<D, double>(places, cells, kernel.support(), period, false, alone);
   for (std::size_t p = 0; p < places.size(); ++p) {
     FluidAtPoint& at = result[p];

@@ -46,7 +46,7 @@ std::vector<std::vector<std::int32_t>> by_cells(const Points<D, T>& from, const 
                                                 InstructionSet set = best_instruction_set()) {
   Workers workers(threads);
   CellGrid<D, T> grid;
-  grid.build(std::span<const Vec<T, D>>(to), radius, period);
+  grid.build(std::span<const Vec<T, D>>(to), radius, period, workers);
   const Rows rows = candidates<D, T>(std::span<const Vec<T, D>>(from), grid, radius, period, same,
                                      workers, set);
   std::vector<std::vector<std::int32_t>> lists(from.size());

@@ -1,6 +1,8 @@
 // Who does which part of a range, and that each is done once.
 #include "core/workers.h"
 
+#include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <mutex>
 #include <set>
@@ -124,6 +126,55 @@ TEST(Workers, ThrowTheExceptionOfTheFirstPartAndGoOn) {
     }
     EXPECT_EQ(parts_of(workers, 120, 1).size(), workers.parts());
   }
+}
+
+TEST(Patience, SeesWhatBecomesReadyWhileItLooks) {
+  Patience patience;
+  for (int again = 0; again < 100; ++again) {
+    int asked = 0;
+    EXPECT_TRUE(patience.look([&] { return ++asked == 5; }));
+    EXPECT_EQ(asked, 5);
+  }
+}
+
+TEST(Patience, IsSoonLostWhereItIsInVain) {
+  Patience patience;
+  int looks = 0;
+  for (int wait = 0; wait < 320; ++wait) {
+    int asked = 0;
+    EXPECT_FALSE(patience.look([&] {
+      ++asked;
+      return false;
+    }));
+    EXPECT_GE(asked, 1);
+    looks += asked > 1 ? 1 : 0;
+  }
+  // After the first ones it looks at one wait in 32.
+  EXPECT_GE(looks, 10);
+  EXPECT_LE(looks, 15);
+}
+
+TEST(Patience, ComesBackWithTheFirstSuccess) {
+  Patience patience;
+  int asked = 0;
+  const auto never = [&] {
+    ++asked;
+    return false;
+  };
+  for (int wait = 0; wait < 64; ++wait) patience.look(never);
+  bool found = false;
+  for (int wait = 0; wait < 64 && !found; ++wait) {
+    asked = 0;
+    found = patience.look([&] { return ++asked == 3; });
+  }
+  ASSERT_TRUE(found) << "it looks again now and then";
+  EXPECT_FALSE(patience.look(never));
+  asked = 0;
+  EXPECT_FALSE(patience.look(never)) << "one wait is left out after one in vain";
+  EXPECT_EQ(asked, 1);
+  asked = 0;
+  EXPECT_FALSE(patience.look(never));
+  EXPECT_GT(asked, 1);
 }
 
 }  // namespace
