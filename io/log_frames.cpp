@@ -86,6 +86,7 @@ void LogReaderImpl::walk_steps(
   RecordWalk walk(source_, start_of_walk(from, decode), RecordWalk::any_sequence, end_,
                   Check::message);
   DeltaChain chain;
+  std::optional<std::uint64_t> before;
   for (auto item = walk.next(); item != RecordWalk::Item::end; item = walk.next()) {
     if (item == RecordWalk::Item::bad) {
       completeness_ = Completeness::damaged;
@@ -93,6 +94,11 @@ void LogReaderImpl::walk_steps(
     }
     const Record& record = walk.record();
     if (!is_step(record.header.kind)) continue;
+    if (before && record.header.step <= *before) {  // it goes back: as if it were not there
+      completeness_ = Completeness::damaged;
+      continue;
+    }
+    before = record.header.step;
     if (record.header.step > to) return;
     const StepMessage message = step_message(record);
     const StepHeader header = header_of(record, message);

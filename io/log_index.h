@@ -28,6 +28,7 @@ class IndexLookup {
 
   /// Starts from the index record at `offset`: the last one.
   void set_root(std::uint64_t offset);
+  void clear() { root_ = nullptr; }
   bool has_root() const { return root_ != nullptr; }
   std::uint64_t last_step() const { return root_->message.last_step(); }
   /// Where the records behind the last index record begin.

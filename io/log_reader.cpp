@@ -115,6 +115,23 @@ bool LogReaderImpl::start_from_index(std::uint64_t index_offset) {
   }
 }
 
+// The last index, from the one at `index_offset` back, that is known to have been synced, and with
+// it all that it covers. What stands behind may be torn anywhere, however whole its own end is, so
+// all of that is walked; from the first step on where no index is known to be durable.
+bool LogReaderImpl::start_from_durable_index(std::uint64_t index_offset) {
+  index_.clear();
+  Record record;
+  while (index_offset != 0) {
+    if (!source_.read(index_offset, file_end_, Check::message, record) ||
+        record.header.kind != RecordKind::index || record.header.index_offset >= index_offset) {
+      return false;
+    }
+    if (record.header.sequence <= durable_seq_) return start_from_index(index_offset);
+    index_offset = record.header.index_offset;
+  }
+  return true;
+}
+
 void LogReaderImpl::find_end() {
   std::uint64_t offset = 0;
   const auto header = source_.find_last_header(file_end_, offset);
@@ -128,8 +145,8 @@ void LogReaderImpl::find_end() {
       if (error.kind() != ErrorKind::damaged && error.kind() != ErrorKind::limit) throw;
     }
     // The last index record may itself be torn; its header then leads to the one before.
-    if (header->kind == RecordKind::index) started = start_from_index(offset);
-    if (!started && header->index_offset != 0) started = start_from_index(header->index_offset);
+    started = start_from_durable_index(header->kind == RecordKind::index ? offset
+                                                                         : header->index_offset);
   }
   if (!started || !walk_on()) scan_all();
 }
@@ -146,6 +163,20 @@ void LogReaderImpl::absorb_index(const Record& record) const {
   loose_events_.clear();
 }
 
+// Steps follow each other, unless a gap says which are missing. While damage is scanned for, steps
+// may be lost with it, and what goes back is as if it were not there.
+void LogReaderImpl::check_order(const Record& record) const {
+  const bool after_gap = std::exchange(after_gap_, false);
+  const std::uint64_t step = record.header.step;
+  if (steps_seen_ == 0 || step == last_.step + 1 || (after_gap && step > last_.step)) return;
+  if (!scan_ || step <= last_.step) {
+    throw LogError(ErrorKind::damaged, path_,
+                   "step " + std::to_string(step) + " follows step " + std::to_string(last_.step),
+                   static_cast<std::int64_t>(record.offset));
+  }
+  completeness_ = Completeness::damaged;
+}
+
 void LogReaderImpl::absorb(const Record& record) const {
   const RecordKind kind = record.header.kind;
   // An event counts once the step that it belongs to is there.
@@ -153,8 +184,12 @@ void LogReaderImpl::absorb(const Record& record) const {
     loose_events_.push_back(record.offset);
     return;
   }
-  if (kind == RecordKind::gap) return;  // so does a gap
+  if (kind == RecordKind::gap) {  // so does a gap
+    after_gap_ = true;
+    return;
+  }
   if (is_step(kind)) {
+    check_order(record);
     const StepMessage message = step_message(record);
     last_ = header_of(record, message);
     if (steps_seen_++ == 0) first_ = last_;
@@ -182,6 +217,7 @@ void LogReaderImpl::absorb(const Record& record) const {
 // instead.
 bool LogReaderImpl::walk_on() const {
   loose_events_.clear();
+  after_gap_ = false;
   RecordWalk walk(source_, end_, next_sequence_, file_end_, Check::body);
   std::optional<std::uint64_t> torn_from;
   for (auto item = walk.next(); item != RecordWalk::Item::end; item = walk.next()) {

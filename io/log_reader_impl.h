@@ -56,9 +56,11 @@ class LogReaderImpl final : public LogReader {
   void find_end();
   bool close_by_end_record(const RecordHeader& header, std::uint64_t offset);
   bool start_from_index(std::uint64_t index_offset);
+  bool start_from_durable_index(std::uint64_t index_offset);
   void follow();
   bool walk_on() const;
   void scan_all() const;
+  void check_order(const Record& record) const;
   void absorb(const Record& record) const;
   void absorb_index(const Record& record) const;
   void settle() const;
@@ -109,6 +111,7 @@ class LogReaderImpl final : public LogReader {
   // Steps and events behind the last index record; bounded, since index records come regularly.
   mutable std::vector<StepEntry> pending_;
   mutable std::vector<std::uint64_t> pending_events_, loose_events_;
+  mutable bool after_gap_ = false;  ///< the record before was one
   mutable IndexLookup index_;
   mutable std::optional<LogScan> scan_;  ///< set: the index is not used
 

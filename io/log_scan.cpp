@@ -45,6 +45,7 @@ LogScan::Reached LogScan::walk_to(std::uint64_t step) {
     if (item == RecordWalk::Item::bad) continue;
     const Record& record = walk.record();
     if (!is_step(record.header.kind)) continue;
+    if (out.last && record.header.step <= out.last->step) continue;  // as if it were not there
     if (record.header.step > step) break;
     const auto state = stored_in(record);
     if (!state) continue;

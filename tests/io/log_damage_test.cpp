@@ -376,6 +376,55 @@ TEST_F(LogDamage, RecordRepeatedOrMovedIsRefused) {
   EXPECT_EQ(LogReader::open("log", &files_)->verify().steps, 20U);
 }
 
+TEST_F(LogDamage, AStepThatGoesBackIsDamageToEveryReader) {
+  write_toy_log("log", small(), untimed(files_));
+  LogBytes bytes(files_, "log");
+  const PlacedRecord record = bytes.record(RecordKind::step, 5);
+  io::RecordHeader header = record.header;
+  const std::uint64_t lost = header.step;
+  header.step = lost - 3;
+  bytes.set_header(record.offset, header).put(files_, "log");
+  EXPECT_EQ(verdict(), Completeness::damaged);
+  const auto reader = LogReader::open("log", &files_);
+  std::uint64_t before = 0, visited = 0;
+  reader->for_each(0, reader->last_step(), [&](const io::StepHeader& step, const io::Frame*) {
+    EXPECT_TRUE(visited == 0 || step.step > before) << step.step;
+    before = step.step;
+    return ++visited < 100;
+  });
+  EXPECT_EQ(visited, 20U) << "20 of 21 steps";
+  EXPECT_EQ(reader->completeness(), Completeness::damaged);
+  EXPECT_TRUE(reader->frame(lost - 3));
+  EXPECT_FALSE(reader->frame(lost));
+}
+
+TEST_F(LogDamage, DamageInFrontOfAnIndexThatWasNotSyncedIsATornTail) {
+  // A machine that stops may have written a later page and not an earlier one.
+  ToyOptions options = small();
+  options.steps = 600;
+  io::WriterOptions unsynced = untimed(files_);
+  unsynced.keyframe_sync_apart_seconds = 1e6;
+  write_toy_log("log", options, unsynced, false);
+  LogBytes bytes(files_, "log");
+  const auto records = bytes.records();
+  const auto index = std::find_if(records.begin(), records.end(), [](const PlacedRecord& record) {
+    return record.header.kind == RecordKind::index;
+  });
+  ASSERT_NE(index, records.end());
+  ASSERT_LT(records.back().header.durable_seq, 10U) << "nothing but the start was synced";
+  const PlacedRecord& torn = *std::find_if(records.begin() + 20, records.end(), [](const auto& r) {
+    return r.header.kind == RecordKind::step;
+  });
+  ASSERT_LT(torn.offset, index->offset);
+  bytes.set_byte(torn.offset + io::header_bytes + 40, 0x55).put(files_, "log");
+  const auto reader = LogReader::open("log", &files_);
+  EXPECT_EQ(reader->completeness(), Completeness::torn);
+  EXPECT_EQ(reader->last_step(), torn.header.step - 1);
+  EXPECT_EQ(reader->verify().completeness, Completeness::torn);
+  extend("log", options, 610);
+  EXPECT_EQ(verdict(), Completeness::complete);
+}
+
 TEST_F(LogDamage, RecordOfAnotherLogIsRefused) {
   write_toy_log("log", small(), untimed(files_));
   LogBytes bytes(files_, "log");
