@@ -144,9 +144,8 @@ void LogReaderImpl::find_end() {
     } catch (const LogError& error) {
       if (error.kind() != ErrorKind::damaged && error.kind() != ErrorKind::limit) throw;
     }
-    // The last index record may itself be torn; its header then leads to the one before.
-    started = start_from_durable_index(header->kind == RecordKind::index ? offset
-                                                                         : header->index_offset);
+    // An index record at the very end cannot be known to be synced: its header leads to others.
+    started = start_from_durable_index(header->index_offset);
   }
   if (!started || !walk_on()) scan_all();
 }
