@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "io/digest.h"
 #include "io/errors.h"
 #include "io/file.h"
 #include "io/log_appender.h"
@@ -220,10 +222,22 @@ class Salvage {
     write_events(step);
     const std::vector<std::byte> body = body_of(record);
     const std::span<const std::byte> blobs[] = {body};
-    log_->step(step, record.header.kind == RecordKind::keyframe, *message,
+    log_->step(step, record.header.kind == RecordKind::keyframe, with_checksums(*message, body),
                body.empty() ? std::span<const std::span<const std::byte>>{} : blobs);
     chain_ = message->chain;
     ++out_.steps_kept;
+  }
+
+  // A record may come without checksums; the one that is written has them, of all its blobs.
+  static StepMessage with_checksums(StepMessage message, std::span<const std::byte> body) {
+    std::uint64_t at = 0;
+    const auto renew = [&](auto& blob) {
+      blob.checksum = checksum(body.subspan(at, blob.stored));
+      at += aligned(blob.stored);
+    };
+    for (FieldBlob& blob : message.fields) renew(blob);
+    for (TableBlob& blob : message.tables) renew(blob);
+    return message;
   }
 
   // A state that does not decode to its digest is as good as lost, and so are the deltas upon it.
