@@ -77,6 +77,8 @@ class LogReader {
 
   /// Header of a step, by index; nothing where the log does not hold the step.
   virtual std::optional<StepHeader> header(std::uint64_t step) const = 0;
+  /// Nearest step <= `step` that the log holds; its first step where there is none.
+  virtual std::uint64_t held_at_or_before(std::uint64_t step) const = 0;
   /// Nearest step <= `step` whose state is stored, from which re-execution can start.
   virtual std::optional<std::uint64_t> stored_step_at_or_before(std::uint64_t step) const = 0;
   /// The state of a step, tables included. Nothing where its state is not stored (tier digests,

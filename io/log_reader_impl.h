@@ -30,6 +30,7 @@ class LogReaderImpl final : public LogReader {
   }
 
   std::optional<StepHeader> header(std::uint64_t step) const override;
+  std::uint64_t held_at_or_before(std::uint64_t step) const override;
   std::optional<std::uint64_t> stored_step_at_or_before(std::uint64_t step) const override;
   std::optional<Frame> frame(std::uint64_t step) const override;
   std::optional<Frame> tables(std::uint64_t step) const override;
@@ -70,7 +71,6 @@ class LogReaderImpl final : public LogReader {
   auto ask(Ask&& ask) const;
   std::optional<StepEntry> entry(std::uint64_t step) const;
   std::optional<StepEntry> keyframe_at_or_before(std::uint64_t step) const;
-  std::uint64_t held_at_or_before(std::uint64_t step) const;
   std::vector<std::uint64_t> event_offsets() const;
   bool read_event(std::uint64_t offset, Event& event) const;
   bool read_step(const StepEntry& entry, Record& record, StepMessage& message) const;

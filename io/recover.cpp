@@ -130,13 +130,14 @@ class Salvage {
   void take_gap(const Record& record) {
     const auto gap = understood(
         record, [&] { return decode_gap(record.message, source_.limits()); });
-    deltas_.interrupt();
-    chain_.reset();
+    // One that makes no sense says nothing: whether the next step follows, its chain will tell.
     if (!gap || gap->from > gap->to) return;
     if (last_step_ && gap->to <= *last_step_) {
       spoilt(record.offset, fmt::format("gap to step {} follows step {}", gap->to, *last_step_));
       return;
     }
+    deltas_.interrupt();
+    chain_.reset();
     what_ = gap->what;
     lose(last_step_ ? *last_step_ + 1 : gap->from, gap->to);
     last_step_ = gap->to;

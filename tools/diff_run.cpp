@@ -103,6 +103,16 @@ class LogComparison {
     return (*x).*digest == (*y).*digest;
   }
 
+  /// The last step <= `step` that both logs hold.
+  std::optional<std::uint64_t> held_below(std::uint64_t step) const {
+    for (;;) {
+      const std::uint64_t x = a_.held_at_or_before(step), y = b_.held_at_or_before(step);
+      if (x == y && x <= step) return x;
+      if (std::max(x, y) > step) return {};
+      step = std::min(x, y);
+    }
+  }
+
   /// First step whose state can differ, by bisection over the chains; nothing if there is none.
   std::optional<std::uint64_t> locate() {
     if (io::chain_base(a_.genesis().schema) != io::chain_base(b_.genesis().schema)) {
@@ -111,9 +121,10 @@ class LogComparison {
       report_.notes.push_back("the field schemas differ, so all stored states were compared");
       return report_.from;
     }
-    const ChainSearch found = search_chains(report_.from, report_.to, [&](std::uint64_t step) {
-      return agree(step, &io::StepHeader::chain);
-    });
+    const HeldBelow below = [this](std::uint64_t step) { return held_below(step); };
+    const ChainSearch found = search_chains(
+        report_.from, report_.to,
+        [&](std::uint64_t step) { return agree(step, &io::StepHeader::chain); }, below);
     if (!found.any_step) {
       not_comparable(report_, "the steps that both should hold are lost in one of them");
       return {};
@@ -127,9 +138,9 @@ class LogComparison {
       return found.first_unequal;
     }
     // The chains differ from the start: the histories before the range may, and the states not.
-    const auto first = scan_first_unequal(found.first_held, report_.to, [&](std::uint64_t step) {
-      return agree(step, &io::StepHeader::digest);
-    });
+    const auto first = scan_first_unequal(
+        found.first_held, report_.to,
+        [&](std::uint64_t step) { return agree(step, &io::StepHeader::digest); }, below);
     if (first != found.first_held)
       report_.notes.push_back(fmt::format(
           "the chains differ already at step {}, where the states are equal: the histories before "
@@ -234,6 +245,11 @@ class LogComparison {
     const std::uint64_t begin = options_.all_tables ? report_.from : step;
     const std::uint64_t end = options_.all_tables ? report_.to : step;
     for (std::uint64_t at = begin; at <= end; ++at) {
+      if (!agree(at, &io::StepHeader::digest)) {  // lost: on to the next that both hold
+        const auto held = held_above(at, end, [this](std::uint64_t s) { return held_below(s); });
+        if (!held) return;
+        at = *held;
+      }
       const std::vector<std::string> found = compare_tables(a_, b_, at);
       report_.notes.insert(report_.notes.end(), found.begin(), found.end());
       if (!found.empty() || at == end) return;

@@ -1,5 +1,6 @@
 #include "tools/diff_search.h"
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 #include <set>
@@ -79,6 +80,29 @@ TEST(DiffSearch, TheEndOfTheNumbersIsReached) {
 TEST(DiffSearch, AScanSeesADifferenceThatGoesAway) {
   EXPECT_EQ(scan_first_unequal(5, 20, [](std::uint64_t step) { return std::optional(step != 7); }),
             7u);
+}
+
+TEST(DiffSearch, ManyLostStepsCostNoMoreThanOne) {
+  // Both sides hold 0..9 and, far behind, the last three; they part at the last but one.
+  const std::uint64_t last = std::uint64_t{1} << 60;
+  const auto held = [&](std::uint64_t step) { return step < 10 || step >= last - 2; };
+  int asked = 0;
+  const auto equal = [&](std::uint64_t step) -> std::optional<bool> {
+    ++asked;
+    if (!held(step)) return {};
+    return step < last - 1;
+  };
+  const auto below = [&](std::uint64_t step) -> std::optional<std::uint64_t> {
+    return step >= last - 2 ? step : std::min<std::uint64_t>(step, 9);
+  };
+  const ChainSearch found = search_chains(0, last, equal, below);
+  EXPECT_EQ(found.last_equal, last - 2);
+  EXPECT_EQ(found.first_unequal, last - 1);
+  EXPECT_EQ(scan_first_unequal(0, last, equal, below), last - 1);
+  EXPECT_LT(asked, 300);
+  EXPECT_EQ(held_above(10, last, below), last - 2);
+  EXPECT_EQ(held_above(4, last, below), 4u);
+  EXPECT_FALSE(held_above(10, last - 3, below));
 }
 
 }  // namespace
