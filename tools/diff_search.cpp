@@ -73,7 +73,7 @@ ChainSearch search_chains(std::uint64_t from, std::uint64_t to, const EqualAt& c
     const std::uint64_t middle = equal + (unequal - equal) / 2;
     // Lost steps around the middle: go on with the nearest ones that are there.
     auto probe = probe_up(middle, unequal - 1, chains_equal, below);
-    if (!probe && middle > equal + 1) 
+    if (!probe && middle > equal + 1)
       probe = probe_down(middle - 1, equal + 1, chains_equal, below);
     if (!probe) break;
     (probe->equal ? equal : unequal) = probe->step;
