@@ -61,14 +61,15 @@ ChainSearch search_chains(std::uint64_t from, std::uint64_t to, const EqualAt& c
   if (!last) return out;
   out.any_step = true;
   out.last_held = last->step;
-  const auto first = probe_up(from, last->step, chains_equal, below);
-  out.first_held = first->step;
+  // Damage may hide a step from one way of looking and not from the other: the last one is there.
+  const auto first = probe_up(from, last->step, chains_equal, below).value_or(*last);
+  out.first_held = first.step;
   if (last->equal) return out;
-  if (!first->equal) {
-    out.first_unequal = first->step;
+  if (!first.equal) {
+    out.first_unequal = first.step;
     return out;
   }
-  std::uint64_t equal = first->step, unequal = last->step;
+  std::uint64_t equal = first.step, unequal = last->step;
   while (unequal - equal > 1) {
     const std::uint64_t middle = equal + (unequal - equal) / 2;
     // Lost steps around the middle: go on with the nearest ones that are there.
