@@ -249,6 +249,8 @@ std::vector<ModelUse> models_of(const Scenario& s) {
   add("artificial viscosity", fluid && artificial,
       fluid ? setting("fluid.artificial_alpha", s) + ", " + setting("fluid.artificial_beta", s)
             : "no fluid");
+  add("particle shifting", fluid && s.fluid.shifting > 0,
+      fluid ? setting("fluid.shifting", s) : "no fluid");
   const bool tait = s.fluid.equation_of_state == EquationOfState::tait;
   add("Tait's equation", fluid && tait,
       fluid ? setting("fluid.equation_of_state", s) : "no fluid");

@@ -91,6 +91,7 @@ Constants<D> constants_of(const Scenario& s) {
       c.tait_pressure = s.fluid.density * (s.fluid.sound_speed * s.fluid.sound_speed) / 7;
     c.artificial_alpha = s.fluid.artificial_alpha;
     c.artificial_beta = s.fluid.artificial_beta;
+    c.shifting_speed = s.fluid.shifting * 0.1 * s.fluid.sound_speed;
     if (c.full_pressure) c.fluid_acceleration = c.gravity;
     c.fluid_acceleration[0] += s.fluid.body_force_x;
     c.fluid_acceleration[1] += s.fluid.body_force_y;

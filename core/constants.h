@@ -37,6 +37,7 @@ struct Constants {
   double diffusion = 0;          // [-] delta
   double tait_pressure = 0;      // [Pa] B; 0: linear equation of state
   double artificial_alpha = 0, artificial_beta = 0;  // [-] of Monaghan's viscosity
+  double shifting_speed = 0;  // [m/s] U of particle shifting; 0: none
   double spacing = 0;            // [m] dx
   bool full_pressure = false;
   Vec<double, D> gravity = Vec<double, D>::Zero();           // [m/s2]
@@ -62,6 +63,7 @@ struct Constants {
 
   /// Fills `pairs` and the extreme diameters from species and contact.
   void set_pairs();
+  bool shifts() const { return shifting_speed > 0; }
 };
 
 template <int D>

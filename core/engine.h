@@ -63,7 +63,8 @@ class Engine final : public Simulation {
     std::vector<Real> porosity, floored_porosity, volume_before, density_before, volume, pressure;
     std::vector<Real> push;
     std::vector<PairRecord<Real>> records;
-    std::vector<Vec<Real, D>> stress_force, viscous_force;
+    std::vector<Vec<Real, D>> stress_force, viscous_force, shift_velocity;
+    std::vector<Real> gradient_correction;
     std::vector<Vec<Position, D>> wall_position;
     std::vector<Vec<Real, D>> wall_own_velocity, wall_velocity;
     std::vector<Real> wall_volume, wall_viscous_volume, wall_push;
@@ -94,6 +95,7 @@ class Engine final : public Simulation {
   void find_wall_values();
   void find_stresses();
   void add_artificial_viscosity();
+  void find_shifts();
   void find_grain_forces();
   void move_grains();
   void hold_grains();
@@ -124,8 +126,9 @@ class Engine final : public Simulation {
                        const Vec<double, D>& wall_impulse) const;
   std::vector<Vec<double, D>> velocities_ahead() const;
   double internal_energy(double density) const;
+  Vec<double, D> corrected(std::size_t a, const Vec<double, D>& d) const;
   template <class SmoothingKernel>
-  double late_work(const SmoothingKernel& kernel, const Vec<double, D>& d,
+  double late_work(const SmoothingKernel& kernel, std::size_t a, const Vec<double, D>& d,
                    const Vec<double, D>& v) const;
   template <class SmoothingKernel>
   void balance_pairs(const SmoothingKernel& kernel, const std::vector<Vec<double, D>>& mean,

@@ -93,16 +93,31 @@ std::vector<Vec<double, D>> Engine<D, P>::velocities_ahead() const {
   return ahead;
 }
 
-/// grad W . v of a pair that is `d` apart and will part with `v`, here less a step later, halved:
-/// continuity uses the places of the step's start all the step long.
+/// What the gradients of particle a make of a separation: itself, unless they are corrected.
+template <int D, class P>
+Vec<double, D> Engine<D, P>::corrected(std::size_t a, const Vec<double, D>& d) const {
+  if (!c_.shifts()) return d;
+  Vec<double, D> along = Vec<double, D>::Zero();
+  std::size_t n = a * symmetric_numbers<D>;
+  for (int c = 0; c < D; ++c)
+    for (int k = c; k < D; ++k, ++n) {
+      const auto number = static_cast<double>(work_.gradient_correction[n]);
+      along[c] += number * d[k];
+      if (k != c) along[k] += number * d[c];
+    }
+  return along;
+}
+
+/// grad W . v of a pair of particle a that is `d` apart and will part with `v`, here less a step
+/// later, halved: continuity uses the places of the step's start all the step long.
 template <int D, class P>
 template <class SmoothingKernel>
-double Engine<D, P>::late_work(const SmoothingKernel& kernel, const Vec<double, D>& d,
-                               const Vec<double, D>& v) const {
+double Engine<D, P>::late_work(const SmoothingKernel& kernel, std::size_t a,
+                               const Vec<double, D>& d, const Vec<double, D>& v) const {
   using engine_detail::inner;
   const Vec<double, D> then = d + c_.dt * v;
-  return 0.5 * (kernel.slope(std::sqrt(inner<D>(d, d))) * inner<D>(d, v) -
-                kernel.slope(std::sqrt(inner<D>(then, then))) * inner<D>(then, v));
+  return 0.5 * (kernel.slope(std::sqrt(inner<D>(d, d))) * inner<D>(corrected(a, d), v) -
+                kernel.slope(std::sqrt(inner<D>(then, then))) * inner<D>(corrected(a, then), v));
 }
 
 /// Shear, artificial viscosity and density diffusion among the fluid.
@@ -136,7 +151,7 @@ void Engine<D, P>::balance_pairs(const SmoothingKernel& kernel,
       const V dv = va - doubles<D>(state_.fluid.velocity[b]);
       const double other = work_.volume[b];
       sum.step_pressure -= static_cast<double>(work_.push[a]) * volume * other *
-                           late_work(kernel, d, V(2 * (mean[a] - mean[b]) - dv));
+                           late_work(kernel, a, d, V(2 * (mean[a] - mean[b]) - dv));
       shear += other * slope * (r2 / (r2 + soft)) * dv;
       spread += static_cast<double>(work_.volume_before[b]) * slope *
                 (static_cast<double>(work_.density_before[a]) -
@@ -184,16 +199,17 @@ void Engine<D, P>::balance_walls(const SmoothingKernel& kernel,
                       (va - doubles<D>(work_.wall_velocity[w]));
       const V pressed = -(static_cast<double>(work_.push[a]) +
                           static_cast<double>(work_.wall_push[w])) *
-                        volume * static_cast<double>(work_.wall_volume[w]) * slope * d;
+                        volume * static_cast<double>(work_.wall_volume[w]) * slope *
+                        corrected(a, d);
       viscous[a] += shear;
       sum.wall_viscous_loss -= inner<D>(shear, V(mean[a] - own));
       sum.walls_on_fluid += inner<D>(V(shear + pressed), own);
       sum.step_pressure -= static_cast<double>(work_.push[a]) * volume *
                            static_cast<double>(work_.wall_volume[w]) *
-                           late_work(kernel, d, V(2 * mean[a] - va - own));
+                           late_work(kernel, a, d, V(2 * mean[a] - va - own));
       sum.wall_pressure -= static_cast<double>(work_.wall_push[w]) * volume *
                            static_cast<double>(work_.wall_volume[w]) * slope *
-                           inner<D>(d, V(mean[a] - own));
+                           inner<D>(corrected(a, d), V(mean[a] - own));
       const double approach = inner<D>(V(va - own), d);
       if (!artificial || !(approach < 0)) continue;
       const double phi = h * approach / (r2 + soft), rhob = next_.fluid.superficial_density[a];

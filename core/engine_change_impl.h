@@ -36,14 +36,18 @@ void Engine<D, P>::adopt_scenario() {
   clear_ = core::clear_of_walls<D>(walls_);
   if (scenario_.has_fluid()) {
     build_walls();
-    sweeps_ = pair_sweeps<D, P>(scenario_.fluid.kernel, c_.period.any(), c_.conjugate_pressure,
-                                instruction_set_);
+    const PressureSum sum = c_.shifts()             ? PressureSum::corrected
+                            : c_.conjugate_pressure ? PressureSum::conjugate
+                                                    : PressureSum::plain;
+    sweeps_ = pair_sweeps<D, P>(scenario_.fluid.kernel, c_.period.any(), sum, instruction_set_);
     const std::size_t n = state_.fluid.size();
     for (auto* each : {&work_.volume_before, &work_.density_before, &work_.volume, &work_.pressure,
                        &work_.push})
       each->assign(n, 0);
     work_.stress_force.assign(n, Vec<Real, D>::Zero());
     work_.viscous_force.assign(c_.conjugate_pressure ? n : 0, Vec<Real, D>::Zero());
+    work_.shift_velocity.assign(c_.shifts() ? n : 0, Vec<Real, D>::Zero());
+    work_.gradient_correction.assign(c_.shifts() ? n * symmetric_numbers<D> : 0, 0);
     const std::size_t porous = c_.two_way ? n : 0;
     work_.porosity.assign(porous, 1);
     work_.floored_porosity.assign(porous, 1);

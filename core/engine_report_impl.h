@@ -72,6 +72,7 @@ template <int D, class P>
 Vec<double, D> Engine<D, P>::walls_on_fluid(const FluidState<D, P>& at) const {
   Vec<double, D> total = Vec<double, D>::Zero();
   const double h = c_.smoothing_length, soft = 0.01 * h * h;
+  const bool artificial = c_.artificial_alpha > 0 || c_.artificial_beta > 0;
   for (std::size_t w = 0; w < work_.wall_count; ++w)
     for (const std::int32_t index : lists_.fluid_near_wall(w)) {
       const auto a = static_cast<std::size_t>(index);
@@ -92,12 +93,20 @@ Vec<double, D> Engine<D, P>::walls_on_fluid(const FluidState<D, P>& at) const {
                              static_cast<double>(work_.wall_viscous_volume[w]);
       const double pressures = static_cast<double>(work_.push[a]) +
                                static_cast<double>(work_.wall_push[w]);
+      const Vec<double, D> along = corrected(a, d);
+      double approach = 0;
       for (int k = 0; k < D; ++k) {
-        const double dv = static_cast<double>(at.velocity[a][k]) -
-                          static_cast<double>(work_.wall_velocity[w][k]);
-        total[k] += -pressures * volumes * slope * d[k] +
+        const auto v = static_cast<double>(at.velocity[a][k]);
+        const double dv = v - static_cast<double>(work_.wall_velocity[w][k]);
+        total[k] += -pressures * volumes * slope * along[k] +
                     2 * c_.viscosity * viscous * slope * (r2 / (r2 + soft)) * dv;
+        approach += (v - static_cast<double>(work_.wall_own_velocity[w][k])) * d[k];
       }
+      if (!artificial || !(approach < 0)) continue;
+      const double phi = h * approach / (r2 + soft);
+      total -= static_cast<double>(state_.fluid.mass[a]) *
+               static_cast<double>(work_.wall_volume[w]) *
+               (c_.artificial_beta * phi - c_.artificial_alpha * c_.sound_speed) * phi * slope * d;
     }
   if (c_.conjugate_pressure) total += coupling_.walls_on_fluid();
   for (std::size_t a = 0; a < state_.fluid.size(); ++a)

@@ -13,13 +13,12 @@ namespace engine_detail {
 
 /// Names of the stages as Counters reports them; a stage that a scene does not need never runs.
 enum Pass : std::size_t {
-  pass_lists, pass_porosity, pass_density, pass_walls, pass_stress, pass_artificial,
-  pass_grain_forces,
-  pass_contacts, pass_fluid, pass_reaction, pass_count
+  pass_lists, pass_porosity, pass_density, pass_walls, pass_stress, pass_artificial, pass_shift,
+  pass_grain_forces, pass_contacts, pass_fluid, pass_reaction, pass_count
 };
 inline constexpr const char* pass_names[pass_count] = {
-    "lists", "porosity", "density", "walls", "stress", "artificial_viscosity", "grain_forces",
-    "contacts", "fluid", "reaction"};
+    "lists", "porosity", "density", "walls", "stress", "artificial_viscosity", "shifting",
+    "grain_forces", "contacts", "fluid", "reaction"};
 
 /// The skin of the lists over the smoothing length: small enough for short lists, large enough that
 /// they live for several steps at CFL 0.25. It reaches no bit.
@@ -174,6 +173,9 @@ SweepData<D, P> Engine<D, P>::sweep_data() {
   s.tait_pressure = static_cast<Real>(c_.tait_pressure);
   s.artificial_alpha = static_cast<Real>(c_.artificial_alpha);
   s.artificial_beta = static_cast<Real>(c_.artificial_beta);
+  s.gradient_correction = work_.gradient_correction.data();
+  s.shift_velocity = reinterpret_cast<Real*>(work_.shift_velocity.data());
+  s.shifting_speed = static_cast<Real>(c_.shifting_speed);
   for (int k = 0; k < D; ++k) {
     s.gravity[k] = static_cast<Real>(c_.fluid_acceleration[k]);
     // Fluid at rest in the full form has grad rho = rho0 g / c0^2; diffusion acts on what is left.
@@ -255,7 +257,18 @@ void Engine<D, P>::find_stresses() {
                });
   count_pass(engine_detail::pass_stress);
   if (c_.artificial_alpha > 0 || c_.artificial_beta > 0) add_artificial_viscosity();
+  if (c_.shifts()) find_shifts();
   digest_stage(Stage::stress);
+}
+
+template <int D, class P>
+void Engine<D, P>::find_shifts() {
+  const SweepData<D, P> data = sweep_data();
+  workers_.run((data.count + lanes - 1) / lanes, 4,
+               [&](std::size_t begin, std::size_t end, unsigned) {
+                 sweeps_.shift(data, begin, end);
+               });
+  count_pass(engine_detail::pass_shift);
 }
 
 template <int D, class P>
@@ -414,6 +427,7 @@ std::size_t Engine<D, P>::move_fluid_part(std::size_t begin, std::size_t end) {
     Vec<Position, D>& x = next_.fluid.position[a];
     v = state_.fluid.velocity[a] + dt * acceleration;
     x = state_.fluid.position[a] + dt_position * v.template cast<Position>();
+    if (c_.shifts()) x += dt_position * work_.shift_velocity[a].template cast<Position>();
     wrap(x);
     if (first_bad == engine_detail::nobody && !fluid_is_good(a)) first_bad = a;
   }

@@ -5,15 +5,15 @@
 namespace varve::core {
 
 VARVE_DECLARE_FOR_ALL_SETS(template <int D, class P> PairSweeps<D, P> sweeps(
-    Kernel kernel, bool periodic, bool conjugate))
+    Kernel kernel, bool periodic, PressureSum sum))
 
 template <int D, class P>
-PairSweeps<D, P> pair_sweeps(Kernel kernel, bool periodic, bool conjugate, InstructionSet set) {
-  return VARVE_OF_SET(set, sweeps<D, P>(kernel, periodic, conjugate));
+PairSweeps<D, P> pair_sweeps(Kernel kernel, bool periodic, PressureSum sum, InstructionSet set) {
+  return VARVE_OF_SET(set, sweeps<D, P>(kernel, periodic, sum));
 }
 
 #define VARVE_INSTANTIATE(D, P) \
-  template PairSweeps<D, P> pair_sweeps<D, P>(Kernel, bool, bool, InstructionSet);
+  template PairSweeps<D, P> pair_sweeps<D, P>(Kernel, bool, PressureSum, InstructionSet);
 VARVE_INSTANTIATE(2, DoublePrecision)
 VARVE_INSTANTIATE(2, FloatPrecision)
 VARVE_INSTANTIATE(2, MixedPrecision)

@@ -41,6 +41,10 @@ struct GroupedLists {
   const std::int32_t* index = nullptr;
 };
 
+/// Numbers that a symmetric D x D matrix has.
+template <int D>
+inline constexpr int symmetric_numbers = D * (D + 1) / 2;
+
 /// Arrays and numbers of a sweep. Pointers to vectors are particle-major with D components.
 template <int D, class P>
 struct SweepData {
@@ -75,16 +79,23 @@ struct SweepData {
   Real* push = nullptr;  // [Pa] what pairs push each other with: p, unless `conjugate`
   Real* stress_force = nullptr;  // [N] pressure and viscous force on a particle
   Real* viscous_force = nullptr;  // [N] the viscous part of it; only where `conjugate`
+  Real* gradient_correction = nullptr;  // [-] symmetric_numbers<D> a particle; where `corrected`
+  Real* shift_velocity = nullptr;       // [m/s] with which a particle moves beside its own
 
   Real smoothing_length = 0, dt = 0, reference_density = 0, sound_speed = 0, viscosity = 0;
   Real diffusion = 0;               // delta of delta-SPH
   Real tait_pressure = 0;           // [Pa] B of the Tait equation of state; 0: linear
   Real artificial_alpha = 0, artificial_beta = 0;  // of Monaghan's viscosity
+  Real shifting_speed = 0;          // [m/s] U of shifting
   bool conjugate = false;           // pairs push as core/coupling.h says, and so do grains
   Real gravity[D] = {};             // felt by the fluid (0 in the excess-pressure form)
   Real hydrostatic_gradient[D] = {};  // d rho / dx of the fluid at rest (full pressure), else 0
   Position period[D] = {};          // [m] 0 where not periodic
 };
+
+/// How pairs push. `conjugate`: with what core/coupling.h puts in place of p; `corrected`: along
+/// gradients that are exact for linear fields (fluid.shifting).
+enum class PressureSum { plain, conjugate, corrected };
 
 /// One implementation of the loops; each works on a range of groups.
 template <int D, class P>
@@ -94,10 +105,11 @@ struct PairSweeps {
   Loop extrapolate = nullptr;    // wall groups: wall_push, wall_velocity
   Loop stress = nullptr;         // fluid groups: stress_force, viscous_force
   Loop artificial = nullptr;     // fluid groups: adds artificial viscosity to stress_force
+  Loop shift = nullptr;          // fluid groups: shift_velocity
   bool reads_records = false;
 };
 
 template <int D, class P>
-PairSweeps<D, P> pair_sweeps(Kernel kernel, bool periodic, bool conjugate, InstructionSet set);
+PairSweeps<D, P> pair_sweeps(Kernel kernel, bool periodic, PressureSum sum, InstructionSet set);
 
 }  // namespace varve::core

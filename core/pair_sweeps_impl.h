@@ -5,157 +5,22 @@
 #pragma once
 
 #include "core/lanes_impl.h"
+#include "core/pair_lanes_impl.h"
 #include "core/pair_sweeps.h"
+#include "core/shift_sweep_impl.h"
 
 namespace varve::core::VARVE_ISA {
 namespace {
-
-// Kernels without their normalisation: value f(q) and slope f'(q)/q, q = r/h, both zero beyond the
-// support (physics: W = sigma/h^D f, grad W = sigma/h^(D+2) (f'/q) r_ab). Wendland 1995 C2: f =
-// (1-q/2)^4 (2q+1), f'/q = -5 (1-q/2)^3. B-splines (Schoenberg): truncated powers, slope guarded at
-// q = 0, where the true slope times r_ab is 0.
-template <Kernel K, class T>
-inline __attribute__((always_inline)) Lane<T> kernel_value(Lane<T> q) {
-  if constexpr (K == Kernel::wendland_c2) {
-    const Lane<T> u = positive<T>(T(1) - T(0.5) * q);
-    const Lane<T> u2 = u * u;
-    return u2 * u2 * (T(2) * q + T(1));
-  } else if constexpr (K == Kernel::cubic) {
-    const Lane<T> a = positive<T>(T(2) - q), b = positive<T>(T(1) - q);
-    return T(0.25) * (a * a * a) - b * b * b;
-  } else {
-    const Lane<T> a = positive<T>(T(3) - q), b = positive<T>(T(2) - q), c = positive<T>(T(1) - q);
-    return (a * a) * (a * a) * a - T(6) * ((b * b) * (b * b) * b) + T(15) * ((c * c) * (c * c) * c);
-  }
-}
-template <Kernel K, class T>
-inline __attribute__((always_inline)) Lane<T> kernel_slope(Lane<T> q) {
-  if constexpr (K == Kernel::wendland_c2) {
-    const Lane<T> u = positive<T>(T(1) - T(0.5) * q);
-    return T(-5) * (u * u * u);
-  } else {
-    Lane<T> numerator;
-    if constexpr (K == Kernel::cubic) {
-      const Lane<T> a = positive<T>(T(2) - q), b = positive<T>(T(1) - q);
-      numerator = T(3) * (b * b) - T(0.75) * (a * a);
-    } else {
-      const Lane<T> a = positive<T>(T(3) - q), b = positive<T>(T(2) - q),
-                    c = positive<T>(T(1) - q);
-      numerator = T(30) * ((b * b) * (b * b)) - T(5) * ((a * a) * (a * a)) -
-                  T(75) * ((c * c) * (c * c));
-    }
-    const Lane<T> divisor = q > T(1e-12) ? q : T(1e-12) - Lane<T>{};
-    const Lane<T> slope = numerator / divisor;
-    return q > T(1e-12) ? slope : Lane<T>{};
-  }
-}
-
-/// sigma in W = sigma/h^D f(q).
-template <Kernel K, int D, class T>
-inline T normalisation() {
-  constexpr double pi = 3.14159265358979323846;
-  if constexpr (K == Kernel::wendland_c2) return T(D == 2 ? 7 / (4 * pi) : 21 / (16 * pi));
-  if constexpr (K == Kernel::cubic) return T(D == 2 ? 10 / (7 * pi) : 1 / pi);
-  return T(D == 2 ? 7 / (478 * pi) : 1 / (120 * pi));
-}
-template <int D, class T>
-inline T power_of_length(T h) {
-  return D == 2 ? h * h : h * h * h;
-}
-
-/// Of eight particles: position, velocity and two numbers, which the records hold too.
-template <int D, class P>
-struct Particles {
-  using Real = typename P::Real;
-  using Position = typename P::Position;
-  Lane<Position> x[D];
-  Lane<Real> v[D], first, second;
-
-  inline __attribute__((always_inline)) Particles(const SweepData<D, P>& s, const Real* firsts,
-                                                  const Real* seconds,
-                                                  const std::int32_t* index) {
-#ifdef __AVX512F__
-    static_cast<void>(firsts), static_cast<void>(seconds);
-    Lane<Real> number[record_length];
-    gather_records(s.records[0].number, index, number);
-    for (int c = 0; c < D; ++c) {
-      if constexpr (record_velocity<D, P> == 0)
-        x[c] = gather(s.position, index, D, c);
-      else
-        x[c] = number[c];
-      v[c] = number[record_velocity<D, P> + std::size_t(c)];
-    }
-    first = number[record_first<D, P>];
-    second = number[record_first<D, P> + 1];
-#else
-    for (int c = 0; c < D; ++c) {
-      x[c] = gather(s.position, index, D, c);
-      v[c] = gather(s.velocity, index, D, c);
-    }
-    first = gather(firsts, index, 1, 0);
-    second = gather(seconds, index, 1, 0);
-#endif
-  }
-};
-
-/// What one slot of a list holds for eight lanes: separation, its square, kernel argument.
-template <int D, class P>
-struct Separation {
-  using Real = typename P::Real;
-  using Position = typename P::Position;
-  Lane<Real> d[D], r2, q;
-
-  template <bool periodic>
-  inline __attribute__((always_inline)) void set(const Lane<Position>* own,
-                                                 const Lane<Position>* other,
-                                                 const Position* period, Real inverse_h) {
-    r2 = Lane<Real>{};
-    for (int c = 0; c < D; ++c) {
-      Lane<Position> wide = own[c] - other[c];
-      if constexpr (periodic) {
-        const Position length = period[c], half = length * Position(0.5);
-        const Lane<Position> lengths = length - Lane<Position>{};
-        wide = wide > half ? wide - lengths : wide;
-        wide = wide < -half ? wide + lengths : wide;
-        // A side that is not periodic has period 0: both lines then add or take away 0.
-      }
-      d[c] = narrow<Real, Position>(wide);
-      r2 += d[c] * d[c];
-    }
-    q = r2;
-    square_root<Real>(q);
-    q *= inverse_h;
-  }
-  template <bool periodic>
-  inline __attribute__((always_inline)) void set(const Lane<Position>* own, const Position* other,
-                                                 const std::int32_t* index,
-                                                 const Position* period, Real inverse_h) {
-    Lane<Position> x[D];
-    for (int c = 0; c < D; ++c) x[c] = gather(other, index, D, c);
-    set<periodic>(own, x, period, inverse_h);
-  }
-};
-
-/// Loads eight consecutive particles; lanes past the end repeat the last one and are not stored.
-struct OwnIndex {
-  std::int32_t index[lanes];
-  std::size_t used;
-  OwnIndex(std::size_t group, std::size_t count) {
-    const std::size_t first = group * lanes;
-    used = count - first < lanes ? count - first : lanes;
-    for (std::size_t l = 0; l < lanes; ++l)
-      index[l] = static_cast<std::int32_t>(first + (l < used ? l : used - 1));
-  }
-};
 
 /// Continuity for the superficial density (Robinson, Ramaioli and Luding 2014, in the volume form
 /// that is energy-consistent with the pressure force below) with density diffusion on the intrinsic
 /// density (Molteni and Colagrossi 2009):
 ///   d rhob_a/dt = rhob_a sum_b V_b v_ab . grad W_ab
 ///               + eps_a delta h c0 sum_fluid 2 (rho_a - rho_b) (W'/r) V_b
+/// (`corrected`: the first gradient is L_a grad W_ab, exact for linear fields)
 /// then the pressure of the intrinsic density rho = rhob/eps: linear, P = c0^2 (rho - rho0), or
 /// Tait's, P = B ((rho/rho0)^7 - 1) with B = rho0 c0^2 / 7.
-template <int D, class P, Kernel K, bool periodic>
+template <int D, class P, Kernel K, bool periodic, bool corrected>
 void density_loop(const SweepData<D, P>& s, std::size_t group_begin, std::size_t group_end) {
   using Real = typename P::Real;
   const Real inverse_h = Real(1) / s.smoothing_length;
@@ -168,31 +33,43 @@ void density_loop(const SweepData<D, P>& s, std::size_t group_begin, std::size_t
     const Particles<D, P> here(s, s.density_before, s.volume_before, own.index);
     Lane<Real> divergence{}, spread{};
     Separation<D, P> pair;
+    CorrectedGradients<D, Real> gradients;
+    const auto add = [&](Lane<Real> weight, const Lane<Real>* dv) {
+      if constexpr (corrected) {
+        gradients.add(weight, pair.d, dv);
+      } else {
+        Lane<Real> approach{};
+        for (int c = 0; c < D; ++c) approach += dv[c] * pair.d[c];
+        divergence += weight * approach;
+      }
+    };
     for (std::uint32_t k = s.fluid.start[g]; k < s.fluid.start[g + 1]; ++k) {
       const std::int32_t* j = s.fluid.index + std::size_t(k) * lanes;
       const Particles<D, P> there(s, s.density_before, s.volume_before, j);
       pair.template set<periodic>(here.x, there.x, s.period, inverse_h);
-      Lane<Real> approach{}, drop = here.first - there.first;
+      Lane<Real> dv[D], drop = here.first - there.first;
       for (int c = 0; c < D; ++c) {
-        approach += (here.v[c] - there.v[c]) * pair.d[c];
+        dv[c] = here.v[c] - there.v[c];
         drop += s.hydrostatic_gradient[c] * -pair.d[c];
       }
       const Lane<Real> weight = there.second * kernel_slope<K, Real>(pair.q);
-      divergence += weight * approach;
+      add(weight, dv);
       spread += weight * drop;
     }
     for (std::uint32_t k = s.walls.start[g]; k < s.walls.start[g + 1]; ++k) {
       const std::int32_t* j = s.walls.index + std::size_t(k) * lanes;
       pair.template set<periodic>(here.x, s.wall_position, j, s.period, inverse_h);
-      Lane<Real> approach{};
-      for (int c = 0; c < D; ++c)
-        approach += (here.v[c] - gather(s.wall_own_velocity, j, D, c)) * pair.d[c];
-      divergence += gather(s.wall_volume, j, 1, 0) * kernel_slope<K, Real>(pair.q) * approach;
+      Lane<Real> dv[D];
+      for (int c = 0; c < D; ++c) dv[c] = here.v[c] - gather(s.wall_own_velocity, j, D, c);
+      add(gather(s.wall_volume, j, 1, 0) * kernel_slope<K, Real>(pair.q), dv);
     }
     for (std::size_t l = 0; l < own.used; ++l) {
       const std::size_t i = g * lanes + l;
       const Real eps = s.porosity ? s.porosity[i] : Real(1);
       const Real rhob = s.superficial_density[i];
+      if constexpr (corrected)
+        divergence[l] = gradients.divergence(
+            l, slope_scale, s.gradient_correction + i * std::size_t(symmetric_numbers<D>));
       const Real rate =
           slope_scale * (rhob * divergence[l] + eps * diffusion * spread[l]);
       const Real next = rhob + s.dt * rate;
@@ -266,8 +143,10 @@ void extrapolate_loop(const SweepData<D, P>& s, std::size_t group_begin, std::si
 /// Pressure and viscous force (Morris, Fox and Zhu 1997), antisymmetric pair by pair:
 ///   F_a = V_a sum_b V_b [ -(P_a + P_b) (W'/r) r_ab + 2 mu (W'/r) r^2/(r^2 + 0.01 h^2) v_ab ]
 /// with something else in place of P where grains take their part of the pressure work pair by pair
-/// (`conjugate`, core/coupling.h); the viscous part is then also stored by itself.
-template <int D, class P, Kernel K, bool periodic, bool conjugate>
+/// (`conjugate`, core/coupling.h); the viscous part is then also stored by itself. `corrected`:
+///   -(P_a L_a + P_b L_b) (W'/r) r_ab
+/// in place of the first term, whose work is that of the corrected continuity; dummies have L_a.
+template <int D, class P, Kernel K, bool periodic, PressureSum sum>
 void stress_loop(const SweepData<D, P>& s, std::size_t group_begin, std::size_t group_end) {
   using Real = typename P::Real;
   const Real inverse_h = Real(1) / s.smoothing_length;
@@ -275,6 +154,7 @@ void stress_loop(const SweepData<D, P>& s, std::size_t group_begin, std::size_t 
       normalisation<K, D, Real>() / power_of_length<D>(s.smoothing_length) * inverse_h * inverse_h;
   const Real soft = Real(0.01) * s.smoothing_length * s.smoothing_length;
   const Real viscous = Real(2) * s.viscosity;
+  constexpr bool conjugate = sum == PressureSum::conjugate;
   for (std::size_t g = group_begin; g < group_end; ++g) {
     const OwnIndex own(g, s.count);
     const Particles<D, P> here(s, s.push, s.volume, own.index);
@@ -288,6 +168,10 @@ void stress_loop(const SweepData<D, P>& s, std::size_t group_begin, std::size_t 
       }
     };
     Separation<D, P> pair;
+    constexpr int numbers = symmetric_numbers<D>;
+    Lane<Real> own_correction[numbers], tensor[numbers], along[D];
+    if constexpr (sum == PressureSum::corrected)
+      gather_corrections<D, Real>(s.gradient_correction, own.index, own_correction);
     for (std::uint32_t k = s.fluid.start[g]; k < s.fluid.start[g + 1]; ++k) {
       const std::int32_t* j = s.fluid.index + std::size_t(k) * lanes;
       const Particles<D, P> there(s, s.push, s.volume, j);
@@ -295,8 +179,15 @@ void stress_loop(const SweepData<D, P>& s, std::size_t group_begin, std::size_t 
       const Lane<Real> weight = there.second * kernel_slope<K, Real>(pair.q);
       const Lane<Real> push = -(here.first + there.first) * weight;
       const Lane<Real> drag = viscous * weight * (pair.r2 / (pair.r2 + soft));
-      for (int c = 0; c < D; ++c)
-        add(push * pair.d[c], drag, c, there.v[c]);
+      if constexpr (sum == PressureSum::corrected) {
+        gather_corrections<D, Real>(s.gradient_correction, j, tensor);
+        for (int n = 0; n < numbers; ++n)
+          tensor[n] = here.first * own_correction[n] + there.first * tensor[n];
+        correct<D, Real>(tensor, pair.d, along);
+        for (int c = 0; c < D; ++c) add(-weight * along[c], drag, c, there.v[c]);
+      } else {
+        for (int c = 0; c < D; ++c) add(push * pair.d[c], drag, c, there.v[c]);
+      }
     }
     for (std::uint32_t k = s.walls.start[g]; k < s.walls.start[g + 1]; ++k) {
       const std::int32_t* j = s.walls.index + std::size_t(k) * lanes;
@@ -307,8 +198,14 @@ void stress_loop(const SweepData<D, P>& s, std::size_t group_begin, std::size_t 
           (gather(s.wall_volume, j, 1, 0) * slope);
       const Lane<Real> drag = viscous * (gather(s.wall_viscous_volume, j, 1, 0) * slope) *
                               (pair.r2 / (pair.r2 + soft));
-      for (int c = 0; c < D; ++c)
-        add(push * pair.d[c], drag, c, gather<Real>(s.wall_velocity, j, D, c));
+      if constexpr (sum == PressureSum::corrected) {
+        correct<D, Real>(own_correction, pair.d, along);
+        for (int c = 0; c < D; ++c)
+          add(push * along[c], drag, c, gather<Real>(s.wall_velocity, j, D, c));
+      } else {
+        for (int c = 0; c < D; ++c)
+          add(push * pair.d[c], drag, c, gather<Real>(s.wall_velocity, j, D, c));
+      }
     }
     for (std::size_t l = 0; l < own.used; ++l) {
       const std::size_t i = g * lanes + l;
@@ -388,35 +285,49 @@ constexpr bool reads_records = true;
 constexpr bool reads_records = false;
 #endif
 
-template <int D, class P, Kernel K, bool periodic>
-PairSweeps<D, P> sweeps_of(bool conjugate) {
-  return {density_loop<D, P, K, periodic>, extrapolate_loop<D, P, K, periodic>,
-          conjugate ? stress_loop<D, P, K, periodic, true> : stress_loop<D, P, K, periodic, false>,
-          artificial_loop<D, P, K, periodic>, reads_records};
+template <int D, class P, Kernel K, bool periodic, PressureSum sum>
+PairSweeps<D, P> sweeps_of() {
+  constexpr bool corrected = sum == PressureSum::corrected;
+  return {density_loop<D, P, K, periodic, corrected>,
+          extrapolate_loop<D, P, K, periodic>,
+          stress_loop<D, P, K, periodic, sum>,
+          artificial_loop<D, P, K, periodic>,
+          corrected ? shift_loop<D, P, K, periodic> : nullptr,
+          reads_records};
+}
+
+template <int D, class P, Kernel K, PressureSum sum>
+PairSweeps<D, P> sweeps_with(bool periodic) {
+  return periodic ? sweeps_of<D, P, K, true, sum>() : sweeps_of<D, P, K, false, sum>();
 }
 
 template <int D, class P, Kernel K>
-PairSweeps<D, P> sweeps_for(bool periodic, bool conjugate) {
-  return periodic ? sweeps_of<D, P, K, true>(conjugate) : sweeps_of<D, P, K, false>(conjugate);
+PairSweeps<D, P> sweeps_for(bool periodic, PressureSum sum) {
+  switch (sum) {
+    case PressureSum::conjugate: return sweeps_with<D, P, K, PressureSum::conjugate>(periodic);
+    case PressureSum::corrected: return sweeps_with<D, P, K, PressureSum::corrected>(periodic);
+    case PressureSum::plain: break;
+  }
+  return sweeps_with<D, P, K, PressureSum::plain>(periodic);
 }
 
 }  // namespace
 
 template <int D, class P>
-PairSweeps<D, P> sweeps(Kernel kernel, bool periodic, bool conjugate) {
+PairSweeps<D, P> sweeps(Kernel kernel, bool periodic, PressureSum sum) {
   switch (kernel) {
-    case Kernel::cubic: return sweeps_for<D, P, Kernel::cubic>(periodic, conjugate);
-    case Kernel::quintic: return sweeps_for<D, P, Kernel::quintic>(periodic, conjugate);
+    case Kernel::cubic: return sweeps_for<D, P, Kernel::cubic>(periodic, sum);
+    case Kernel::quintic: return sweeps_for<D, P, Kernel::quintic>(periodic, sum);
     case Kernel::wendland_c2: break;
   }
-  return sweeps_for<D, P, Kernel::wendland_c2>(periodic, conjugate);
+  return sweeps_for<D, P, Kernel::wendland_c2>(periodic, sum);
 }
 
-template PairSweeps<2, DoublePrecision> sweeps<2, DoublePrecision>(Kernel, bool, bool);
-template PairSweeps<2, FloatPrecision> sweeps<2, FloatPrecision>(Kernel, bool, bool);
-template PairSweeps<2, MixedPrecision> sweeps<2, MixedPrecision>(Kernel, bool, bool);
-template PairSweeps<3, DoublePrecision> sweeps<3, DoublePrecision>(Kernel, bool, bool);
-template PairSweeps<3, FloatPrecision> sweeps<3, FloatPrecision>(Kernel, bool, bool);
-template PairSweeps<3, MixedPrecision> sweeps<3, MixedPrecision>(Kernel, bool, bool);
+template PairSweeps<2, DoublePrecision> sweeps<2, DoublePrecision>(Kernel, bool, PressureSum);
+template PairSweeps<2, FloatPrecision> sweeps<2, FloatPrecision>(Kernel, bool, PressureSum);
+template PairSweeps<2, MixedPrecision> sweeps<2, MixedPrecision>(Kernel, bool, PressureSum);
+template PairSweeps<3, DoublePrecision> sweeps<3, DoublePrecision>(Kernel, bool, PressureSum);
+template PairSweeps<3, FloatPrecision> sweeps<3, FloatPrecision>(Kernel, bool, PressureSum);
+template PairSweeps<3, MixedPrecision> sweeps<3, MixedPrecision>(Kernel, bool, PressureSum);
 
 }  // namespace varve::core::VARVE_ISA

@@ -167,6 +167,9 @@ void add_fluid(std::vector<Parameter>& table) {
            "artificial viscosity (Monaghan), quadratic term"));
   add(real("fluid.density_diffusion", "", pure, {0, 1}, given, Change::never,
            VARVE_REAL(fluid.density_diffusion), "delta of delta-SPH"));
+  add(real("fluid.shifting", "", pure, {0, 4}, given, Change::never, VARVE_REAL(fluid.shifting),
+           "strength of particle shifting, with corrected gradients; 1 suits; not with a free "
+           "surface or two-way coupling"));
   add(real("fluid.jitter", "", pure, {0, 0.5}, given, Change::never, VARVE_REAL(fluid.jitter),
            "largest displacement from the lattice, over spacing"));
   add(whole("fluid.seed", {0, seeds}, Change::never, VARVE_WHOLE(fluid.seed), "of the jitter"));

@@ -197,6 +197,21 @@ class Resolver {
                                    rough_number(particles) + " fluid particles; at most " +
                                    rough_number(particles_max) + " are possible");
     resolve_pressure();
+    check_shifting();
+  }
+
+  /// Shifting sees a free surface as a hole to fill, and corrected gradients have no counterpart in
+  /// the grains' part of the pressure work (core/coupling.h).
+  void check_shifting() {
+    if (!(s_.fluid.shifting > 0)) return;
+    if (has_free_surface(s_))
+      problem("fluid.shifting", number_text(s_.fluid.shifting) +
+                                    ": this fluid has a free surface, off which it would be "
+                                    "shifted; expected 0, or a closed, full or periodic domain");
+    if (s_.is_coupled() && s_.coupling.mode == CouplingMode::two_way)
+      problem("fluid.shifting", number_text(s_.fluid.shifting) +
+                                    ": its gradients leave out the pressure that grains take in "
+                                    "two-way coupling; expected 0, or coupling.mode = one_way");
   }
 
   /// A column of fluid that does not reach the right wall.

@@ -69,6 +69,7 @@ struct Fluid {
   PressureForm pressure = PressureForm::automatic;
   EquationOfState equation_of_state = EquationOfState::linear;
   double artificial_alpha = 0, artificial_beta = 0;  // [-] of Monaghan's viscosity
+  double shifting = 0;             // [-] strength of particle shifting
   double density_diffusion = 0.1;  // [-] delta of delta-SPH
   double jitter = 0;               // [-] of the spacing
   std::int64_t seed = 1;

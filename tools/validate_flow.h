@@ -14,7 +14,7 @@ double poiseuille_speed(const core::Scenario& scenario);
 double poiseuille_profile(double y, double time);
 
 /// Vortices in a periodic square of 5 cm with U = 5 cm/s at Re = U L / nu = 100: L / U is 1 s.
-core::Scenario taylor_green_scene(int cells);
+core::Scenario taylor_green_scene(int cells, bool shifted);
 
 /// [J/m] kinetic energy of the fluid (2D).
 double flow_energy(const Experiment& experiment);

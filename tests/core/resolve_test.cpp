@@ -397,6 +397,16 @@ TEST(Resolve, AGrainsOwnDisturbanceIsCorrectedInSpaceAndTwoWayOnly) {
   EXPECT_THAT(problems_of(s), HasSubstr("'on' in one-way coupling"));
 }
 
+TEST(Resolve, ShiftingIsForFluidThatFillsItsPlaceAndGrainsThatTakeNoneOfIt) {
+  Scenario s = disc();
+  s.fluid.shifting = 1;
+  EXPECT_THAT(problems_of(s), HasSubstr("fluid.shifting: 1: its gradients leave out"));
+  s.coupling.mode = CouplingMode::one_way;
+  EXPECT_EQ(problems_of(s), "");
+  s.domain.top = Boundary::free;
+  EXPECT_THAT(problems_of(s), HasSubstr("fluid.shifting: 1: this fluid has a free surface"));
+}
+
 TEST(Resolve, APipeIsRoundAndHoldsItsGrains) {
   Scenario s = sphere();
   s.domain.shape = Shape::pipe;

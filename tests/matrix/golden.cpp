@@ -105,6 +105,19 @@ std::vector<Scene> scenes() {
   space.domain.depth = 8e-3;
   core::Scenario space_floats = space;
   space_floats.precision = core::Precision::float_;
+  core::Scenario shifted = box(0.02, 0.02), shifted_space = box(8e-3, 8e-3);
+  for (core::Scenario* each : {&shifted, &shifted_space}) {
+    each->fluid.shifting = 1;
+    each->fluid.jitter = 0.2;
+  }
+  shifted.domain.lid_speed = 0.2;
+  shifted_space.domain.dimension = 3;
+  shifted_space.domain.depth = 8e-3;
+  shifted_space.domain.sides = shifted_space.domain.faces = core::Boundary::periodic;
+  shifted_space.domain.bottom = shifted_space.domain.top = core::Boundary::free_slip;
+  shifted_space.fluid.initial = core::InitialFlow::taylor_green;
+  shifted_space.fluid.initial_speed = 0.2;
+  shifted_space.precision = core::Precision::mixed;
   return {
       {.name = "disc", .scenario = disc},
       {.name = "column", .scenario = column},
@@ -118,6 +131,8 @@ std::vector<Scene> scenes() {
       {.name = "mixed", .scenario = mixed, .steps = 30},
       {.name = "space", .scenario = space, .steps = 20},
       {.name = "spacef", .scenario = space_floats, .steps = 20},
+      {.name = "shift", .scenario = shifted, .expects_contacts = false},
+      {.name = "swirl", .scenario = shifted_space, .steps = 20, .expects_contacts = false},
   };
 }
 
