@@ -8,7 +8,7 @@ namespace {
 
 /// Parts per thread: enough that what a late thread leaves is shared out, few enough to cost
 /// nothing.
-constexpr unsigned parts_per_thread = 4;
+constexpr unsigned parts_per_thread = 8;
 
 }  // namespace
 

@@ -2,9 +2,10 @@
 // recording: particle updates per second of CPU (all engine threads together) and of time, and what
 // the log's writer takes. All variants of a scene advance in turns, so that whatever else the
 // machine does strikes them alike.
-//   throughput [--rounds N] [--seconds S] [--scene NAME] [--variant NAME] [--threads N]
+//   throughput [--rounds N] [--seconds S] [--scene NAME] [--variant NAMES] [--threads N]
 // A scene may be all whose names begin with NAME and a dash: `--scene 2d --variant widest` shows
-// what a particle costs among 10^3 to 10^6 of them.
+// what a particle costs among 10^3 to 10^6 of them, `--variant widest,shuffled` also what it costs
+// once neighbours lie anywhere in memory.
 #include <time.h>
 #include <unistd.h>
 
@@ -23,6 +24,7 @@
 
 #include "core/pair_sweeps.h"
 #include "core/parameters.h"
+#include "core/random.h"
 #include "io/log_writer.h"
 #include "tools/simulation_engine.h"
 
@@ -60,7 +62,7 @@ struct Variant {
   core::Precision precision;
   int instruction_set;
   unsigned threads;
-  bool record = false;
+  bool record = false, shuffled = false;
   std::unique_ptr<tools::SimulationEngine> engine = nullptr;
   std::unique_ptr<io::LogWriter> writer = nullptr;
   std::vector<Sample> samples = {};
@@ -106,7 +108,9 @@ std::vector<Variant> variants(const Options& options) {
   const std::string name{core::name_of(core::best_instruction_set())};
   std::vector<Variant> all;
   const auto add = [&](Variant variant) {
-    if (!options.variant.empty() && options.variant != variant.name) return;
+    if (("," + options.variant + ",").find("," + variant.name + ",") == std::string::npos &&
+        !options.variant.empty())
+      return;
     if (options.threads != 0 && options.threads != variant.threads) return;
     all.push_back(std::move(variant));
   };
@@ -117,6 +121,7 @@ std::vector<Variant> variants(const Options& options) {
   add({"mixed", core::Precision::mixed, widest, 1});
   add({"float", core::Precision::float_, widest, 1});
   add({"recording", core::Precision::double_, widest, 1, true});
+  add({"shuffled", core::Precision::double_, widest, 1, false, true});
   if (all.empty()) throw std::runtime_error(options.variant + ": no such variant");
   return all;
 }
@@ -129,10 +134,35 @@ double particles_of(const io::Schema& schema, const io::FrameView& frame) {
   return particles;
 }
 
+/// The same fluid with its particles numbered at random, as if it had been stirred for ever.
+void shuffle_fluid(tools::SimulationEngine& engine) {
+  io::FrameView frame = engine.frame();
+  std::vector<std::vector<std::byte>> shuffled(frame.fields.size());
+  std::vector<std::size_t> from;
+  for (std::size_t k = 0; k < frame.fields.size(); ++k) {
+    const io::FieldDescriptor& field = engine.schema().fields[k];
+    io::FieldView& view = frame.fields[k];
+    if (field.population != "fluid" || field.is_id || field.constant || view.count == 0) continue;
+    if (from.empty()) {
+      for (std::size_t a = 0; a < view.count; ++a) from.push_back(a);
+      for (std::size_t a = view.count; a-- > 1;)  // Fisher and Yates
+        std::swap(from[a], from[core::random_bits(1, a, 0) % (a + 1)]);
+    }
+    const std::size_t size = view.bytes.size() / view.count;
+    for (const std::size_t a : from) {
+      const auto one = view.bytes.subspan(a * size, size);
+      shuffled[k].insert(shuffled[k].end(), one.begin(), one.end());
+    }
+    view.bytes = shuffled[k];
+  }
+  engine.restore(frame);
+}
+
 void prepare(Variant& variant, const Scene& scene, const std::string& log_path) {
   const core::Scenario scenario = scenario_of(scene, variant.precision);
   variant.engine = tools::SimulationEngine::fresh(
       scenario, {.threads = variant.threads, .instruction_set = variant.instruction_set});
+  if (variant.shuffled) shuffle_fluid(*variant.engine);
   if (variant.record) {
     io::WriterOptions options;
     options.overwrite = true;
@@ -219,7 +249,7 @@ Options parse(int argc, char** argv) {
     else if (name == "--variant") options.variant = value;
     else if (name == "--threads") options.threads = static_cast<unsigned>(std::stoul(value));
     else throw std::runtime_error(
-        name + ": unknown; --rounds N --seconds S --scene NAME --variant NAME --threads N");
+        name + ": unknown; --rounds N --seconds S --scene NAME --variant NAMES --threads N");
   }
   if (options.rounds == 0) throw std::runtime_error("--rounds: at least 1");
   return options;
