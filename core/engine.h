@@ -62,7 +62,15 @@ class Engine final : public Simulation {
   struct Work {
     std::vector<Real> porosity, floored_porosity, volume_before, density_before, volume, pressure;
     std::vector<Real> push;
+    // What pairs read of each other, by place in the lists.
     std::vector<PairRecord<Real>> records;
+    std::vector<Vec<Position, D>> place_position;
+    std::vector<Vec<Real, D>> place_velocity;
+    std::vector<Real> place_first, place_second;
+    // What the sweeps find, by place, where that is not by index.
+    std::vector<Real> place_density, place_volume, place_pressure;
+    std::vector<Vec<Real, D>> place_stress, place_viscous;
+    const Real *first = nullptr, *second = nullptr;
     std::vector<Vec<Real, D>> stress_force, viscous_force, shift_velocity;
     std::vector<Real> gradient_correction;
     std::vector<Vec<Position, D>> wall_position;
@@ -90,8 +98,12 @@ class Engine final : public Simulation {
   void find_porosity();
   void prepare_fluid();
   void find_density_and_pressure();
-  void fill_records();
-  void update_records();
+  template <class Body>
+  void for_each_place(const Body& body);
+  template <class Body>
+  void for_each_index(const Body& body);
+  void list_places();
+  void list_numbers(const std::vector<Real>& first, const std::vector<Real>& second);
   void find_wall_values();
   void find_stresses();
   void add_artificial_viscosity();

@@ -98,7 +98,7 @@ template <int D, class P>
 Vec<double, D> Engine<D, P>::corrected(std::size_t a, const Vec<double, D>& d) const {
   if (!c_.shifts()) return d;
   Vec<double, D> along = Vec<double, D>::Zero();
-  std::size_t n = a * symmetric_numbers<D>;
+  std::size_t n = lists_.place_of(a) * symmetric_numbers<D>;
   for (int c = 0; c < D; ++c)
     for (int k = c; k < D; ++k, ++n) {
       const auto number = static_cast<double>(work_.gradient_correction[n]);
@@ -136,14 +136,14 @@ void Engine<D, P>::balance_pairs(const SmoothingKernel& kernel,
                                              (c_.sound_speed * c_.sound_speed) * c_.gravity)
                                          : V(V::Zero());
   for (std::size_t a = 0; a < state_.fluid.size(); ++a) {
-    const std::size_t g = a / lanes, l = a % lanes;
+    const std::size_t at = lists_.place_of(a), g = at / lanes, l = at % lanes;
     const V va = doubles<D>(state_.fluid.velocity[a]);
     const double volume = work_.volume[a], rhob = next_.fluid.superficial_density[a];
     V shear = V::Zero(), pushed = V::Zero();
     double spread = 0;
     for (std::uint32_t k = lists.start[g]; k < lists.start[g + 1]; ++k) {
-      const auto b =
-          static_cast<std::size_t>(lists.index[static_cast<std::size_t>(k) * lanes + l]);
+      const std::size_t b =
+          lists_.index_at(lists.index[static_cast<std::size_t>(k) * lanes + l]);
       if (b == a) continue;
       const V d = apart(state_.fluid.position[a], state_.fluid.position[b]);
       const double r2 = inner<D>(d, d), slope = kernel.slope(std::sqrt(r2));

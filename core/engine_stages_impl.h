@@ -27,9 +27,10 @@ void Engine<D, P>::digest_neighbours() {
   std::vector<std::int32_t> near;
   for (std::size_t i = 0; i < state_.fluid.size(); ++i) {
     near.assign(1, -1 - static_cast<std::int32_t>(i));
-    const std::size_t g = i / lanes, l = i % lanes;
+    const std::size_t at = lists_.place_of(i), g = at / lanes, l = at % lanes;
     for (std::uint32_t k = lists.start[g]; k < lists.start[g + 1]; ++k) {
-      const std::int32_t j = lists.index[static_cast<std::size_t>(k) * lanes + l];
+      const auto j = static_cast<std::int32_t>(
+          lists_.index_at(lists.index[static_cast<std::size_t>(k) * lanes + l]));
       if (static_cast<std::size_t>(j) == i) continue;
       Real r2 = 0;
       for (int a = 0; a < D; ++a) {

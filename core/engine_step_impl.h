@@ -93,15 +93,17 @@ void Engine<D, P>::find_forces() {
 template <int D, class P>
 void Engine<D, P>::update_lists() {
   const double skin = engine_detail::skin_ratio * c_.smoothing_length;
-  bool stale = lists_.stale(state_.fluid.position, skin, workers_);
+  bool stale = lists_.stale(state_.fluid.position, skin, workers_), order_always = false;
   if (coupled()) stale = stale || coupling_.stale(c_, state_, skin);
   if (options_.rebuild_seed != 0 &&
-      random_bits(options_.rebuild_seed, state_.clock.step, 0) % 3 == 0)
+      random_bits(options_.rebuild_seed, state_.clock.step, 0) % 3 == 0) {
     stale = true;
+    order_always = random_bits(options_.rebuild_seed, state_.clock.step, 1) % 2 == 0;
+  }
   if (!stale) return;
   lists_.rebuild(state_.fluid.position,
                  std::span(work_.wall_position.data(), work_.wall_count), c_.support, skin,
-                 c_.period, workers_);
+                 c_.period, order_always, workers_);
   if (coupled())
     coupling_.rebuild(c_, state_, walls_, skin, workers_);
   ++counters_.list_rebuilds;
@@ -136,99 +138,27 @@ void Engine<D, P>::prepare_fluid() {
 }
 
 template <int D, class P>
-SweepData<D, P> Engine<D, P>::sweep_data() {
-  SweepData<D, P> s;
-  s.count = state_.fluid.size();
-  s.position = reinterpret_cast<const Position*>(state_.fluid.position.data());
-  s.velocity = reinterpret_cast<const Real*>(state_.fluid.velocity.data());
-  s.mass = state_.fluid.mass.data();
-  s.superficial_density = state_.fluid.superficial_density.data();
-  s.porosity = two_way() ? work_.floored_porosity.data() : nullptr;
-  s.volume_before = work_.volume_before.data();
-  s.density_before = work_.density_before.data();
-  s.records = work_.records.data();
-  s.fluid = lists_.fluid();
-  s.walls = lists_.walls();
-  s.of_walls = lists_.of_walls();
-  s.wall_count = work_.wall_count;
-  s.wall_position = reinterpret_cast<const Position*>(work_.wall_position.data());
-  s.wall_own_velocity = reinterpret_cast<const Real*>(work_.wall_own_velocity.data());
-  s.wall_volume = work_.wall_volume.data();
-  s.wall_viscous_volume = work_.wall_viscous_volume.data();
-  s.superficial_density_next = next_.fluid.superficial_density.data();
-  s.volume = work_.volume.data();
-  s.pressure = work_.pressure.data();
-  s.push = work_.push.data();
-  s.wall_push = work_.wall_push.data();
-  s.wall_velocity = reinterpret_cast<Real*>(work_.wall_velocity.data());
-  s.stress_force = reinterpret_cast<Real*>(work_.stress_force.data());
-  s.viscous_force = reinterpret_cast<Real*>(work_.viscous_force.data());
-  s.conjugate = c_.conjugate_pressure;
-  s.smoothing_length = static_cast<Real>(c_.smoothing_length);
-  s.dt = static_cast<Real>(c_.dt);
-  s.reference_density = static_cast<Real>(c_.reference_density);
-  s.sound_speed = static_cast<Real>(c_.sound_speed);
-  s.viscosity = static_cast<Real>(c_.viscosity);
-  s.diffusion = static_cast<Real>(c_.diffusion);
-  s.tait_pressure = static_cast<Real>(c_.tait_pressure);
-  s.artificial_alpha = static_cast<Real>(c_.artificial_alpha);
-  s.artificial_beta = static_cast<Real>(c_.artificial_beta);
-  s.gradient_correction = work_.gradient_correction.data();
-  s.shift_velocity = reinterpret_cast<Real*>(work_.shift_velocity.data());
-  s.shifting_speed = static_cast<Real>(c_.shifting_speed);
-  for (int k = 0; k < D; ++k) {
-    s.gravity[k] = static_cast<Real>(c_.fluid_acceleration[k]);
-    // Fluid at rest in the full form has grad rho = rho0 g / c0^2; diffusion acts on what is left.
-    s.hydrostatic_gradient[k] =
-        c_.full_pressure ? static_cast<Real>(c_.reference_density * c_.gravity[k] /
-                                             (c_.sound_speed * c_.sound_speed))
-                         : Real(0);
-    s.period[k] = static_cast<Position>(c_.period.length[k]);
-  }
-  return s;
-}
-
-/// What the density sweep asks of particles.
-template <int D, class P>
-void Engine<D, P>::fill_records() {
-  work_.records.resize(state_.fluid.size());
-  workers_.run(state_.fluid.size(), engine_detail::cheap_items,
-               [&](std::size_t begin, std::size_t end, unsigned) {
-                 for (std::size_t a = begin; a < end; ++a) {
-                   Real* const number = work_.records[a].number;
-                   for (int k = 0; k < D; ++k) {
-                     if constexpr (record_velocity<D, P> > 0)
-                       number[k] = state_.fluid.position[a][k];
-                     number[record_velocity<D, P> + static_cast<std::size_t>(k)] =
-                         state_.fluid.velocity[a][k];
-                   }
-                   number[record_first<D, P>] = work_.density_before[a];
-                   number[record_first<D, P> + 1] = work_.volume_before[a];
-                 }
-               });
-}
-
-/// What the stress sweep asks of them in place of density and volume before the step.
-template <int D, class P>
-void Engine<D, P>::update_records() {
-  workers_.run(state_.fluid.size(), engine_detail::cheap_items,
-               [&](std::size_t begin, std::size_t end, unsigned) {
-                 for (std::size_t a = begin; a < end; ++a) {
-                   Real* const number = work_.records[a].number;
-                   number[record_first<D, P>] = work_.push[a];
-                   number[record_first<D, P> + 1] = work_.volume[a];
-                 }
-               });
-}
-
-template <int D, class P>
 void Engine<D, P>::find_density_and_pressure() {
-  if (sweeps_.reads_records) fill_records();
+  if (lists_.ordered()) {
+    const std::size_t n = state_.fluid.size();
+    for (auto* each : {&work_.place_density, &work_.place_volume, &work_.place_pressure})
+      each->resize(n);
+    work_.place_stress.resize(n);
+    work_.place_viscous.resize(c_.conjugate_pressure ? n : 0);
+  }
+  list_places();
+  list_numbers(work_.density_before, work_.volume_before);
   const SweepData<D, P> data = sweep_data();
   workers_.run((data.count + lanes - 1) / lanes, 4,
                [&](std::size_t begin, std::size_t end, unsigned) {
                  sweeps_.density(data, begin, end);
                });
+  if (lists_.ordered())
+    for_each_index([&](std::size_t a, std::size_t place) {
+      next_.fluid.superficial_density[a] = work_.place_density[place];
+      work_.volume[a] = work_.place_volume[place];
+      work_.pressure[a] = work_.push[a] = work_.place_pressure[place];
+    });
   if (c_.conjugate_pressure)
     coupling_.share_pressure(c_, work_.volume, work_.pressure, work_.porosity,
                              work_.floored_porosity, work_.push, workers_);
@@ -249,7 +179,7 @@ void Engine<D, P>::find_wall_values() {
 
 template <int D, class P>
 void Engine<D, P>::find_stresses() {
-  if (sweeps_.reads_records) update_records();
+  list_numbers(work_.push, work_.volume);
   const SweepData<D, P> data = sweep_data();
   workers_.run((data.count + lanes - 1) / lanes, 4,
                [&](std::size_t begin, std::size_t end, unsigned) {
@@ -257,6 +187,11 @@ void Engine<D, P>::find_stresses() {
                });
   count_pass(engine_detail::pass_stress);
   if (c_.artificial_alpha > 0 || c_.artificial_beta > 0) add_artificial_viscosity();
+  if (lists_.ordered())
+    for_each_index([&](std::size_t a, std::size_t place) {
+      work_.stress_force[a] = work_.place_stress[place];
+      if (c_.conjugate_pressure) work_.viscous_force[a] = work_.place_viscous[place];
+    });
   if (c_.shifts()) find_shifts();
   digest_stage(Stage::stress);
 }

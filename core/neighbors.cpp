@@ -156,7 +156,7 @@ int CellGrid<D, Position>::around(const Vec<Position, D>& point, Stretch* stretc
 template <int D, class Position>
 void find_candidates(std::span<const Vec<Position, D>> from, const CellGrid<D, Position>& grid,
                      double radius, const Periodicity<D>& period, bool same, Workers& workers,
-                     InstructionSet set, RowParts& parts, Rows& rows) {
+                     InstructionSet set, RowParts& parts, Rows& rows, const std::int32_t* own) {
   // The parts are joined in order, so that the result does not depend on how many there are.
   parts.resize(workers.parts());
   rows.start.assign(from.size() + 1, 0);
@@ -181,7 +181,8 @@ void find_candidates(std::span<const Vec<Position, D>> from, const CellGrid<D, P
       for (int a = 0; a < D; ++a) point[a] = static_cast<double>(from[i][a]);
       std::int32_t* const first = part.data() + used;
       std::int32_t* const last = search(data, stretches, grid.around(from[i], stretches), point,
-                                        same ? static_cast<std::int32_t>(i) : -1, first);
+                                        !same ? -1 : own ? own[i] : static_cast<std::int32_t>(i),
+                                        first);
       if (last - first > longest_sorted) std::sort(first, last);
       rows.start[i + 1] = static_cast<std::uint32_t>(last - first);
       used += static_cast<std::size_t>(last - first);
@@ -207,7 +208,8 @@ Rows candidates(std::span<const Vec<Position, D>> from, const CellGrid<D, Positi
 }
 
 void GroupedStorage::assign(const Rows& rows, std::size_t points, Filler filler,
-                            std::int32_t one_past, Workers& workers) {
+                            std::int32_t one_past, Workers& workers,
+                            const std::int32_t* places) {
   const std::size_t groups = (points + lanes - 1) / lanes;
   start_.assign(groups + 1, 0);
   for (std::size_t g = 0; g < groups; ++g) {
@@ -229,7 +231,8 @@ void GroupedStorage::assign(const Rows& rows, std::size_t points, Filler filler,
       const std::int32_t* const from = rows.index.data() + rows.start[i];
       std::int32_t* const to =
           index_.data() + static_cast<std::size_t>(start_[g]) * lanes + at % lanes;
-      for (std::uint32_t k = 0; k < slots; ++k) to[k * lanes] = k < length ? from[k] : fill;
+      for (std::uint32_t k = 0; k < slots; ++k)
+        to[k * lanes] = k >= length ? fill : places ? places[from[k]] : from[k];
     }
   });
 }
@@ -244,7 +247,8 @@ template class CellGrid<3, float>;
                                         const Periodicity<D>&, bool, Workers&, InstructionSet);  \
   template void find_candidates<D, Position>(                                                    \
       std::span<const Vec<Position, D>>, const CellGrid<D, Position>&, double,                   \
-      const Periodicity<D>&, bool, Workers&, InstructionSet, RowParts&, Rows&);
+      const Periodicity<D>&, bool, Workers&, InstructionSet, RowParts&, Rows&,                   \
+      const std::int32_t*);
 VARVE_INSTANTIATE(2, double)
 VARVE_INSTANTIATE(2, float)
 VARVE_INSTANTIATE(3, double)

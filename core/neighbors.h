@@ -73,7 +73,7 @@ struct Rows {
 
 /// For every point of `from`, the points of a grid nearer than `radius` (no more than its cell),
 /// ascending; a point's own index is left out where `same` says that the grid holds the same
-/// points.
+/// points, in the order that `own` says if not in this one.
 template <int D, class Position>
 Rows candidates(std::span<const Vec<Position, D>> from, const CellGrid<D, Position>& grid,
                 double radius, const Periodicity<D>& period, bool same, Workers& workers,
@@ -85,7 +85,8 @@ using RowParts = std::vector<std::vector<std::int32_t>>;
 template <int D, class Position>
 void find_candidates(std::span<const Vec<Position, D>> from, const CellGrid<D, Position>& grid,
                      double radius, const Periodicity<D>& period, bool same, Workers& workers,
-                     InstructionSet set, RowParts& parts, Rows& rows);
+                     InstructionSet set, RowParts& parts, Rows& rows,
+                     const std::int32_t* own = nullptr);
 
 /// What short lanes are filled with.
 enum class Filler { own_index, minus_one, one_past };
@@ -93,9 +94,10 @@ enum class Filler { own_index, minus_one, one_past };
 /// The same rows, eight at a time and interleaved, as the pair sweeps read them.
 class GroupedStorage {
  public:
-  /// `one_past` is the index used by Filler::one_past.
+  /// `one_past` is the index used by Filler::one_past; `places`, if any, replaces what the rows
+  /// hold.
   void assign(const Rows& rows, std::size_t points, Filler filler, std::int32_t one_past,
-              Workers& workers);
+              Workers& workers, const std::int32_t* places = nullptr);
   GroupedLists view() const { return {start_.data(), index_.data()}; }
 
  private:

@@ -62,7 +62,7 @@ inline T power_of_length(T h) {
   return D == 2 ? h * h : h * h * h;
 }
 
-/// Of eight particles: position, velocity and two numbers, which the records hold too.
+/// Of the particles at eight places: position, velocity and the sweep's two numbers.
 template <int D, class P>
 struct Particles {
   using Real = typename P::Real;
@@ -70,16 +70,14 @@ struct Particles {
   Lane<Position> x[D];
   Lane<Real> v[D], first, second;
 
-  inline __attribute__((always_inline)) Particles(const SweepData<D, P>& s, const Real* firsts,
-                                                  const Real* seconds,
+  inline __attribute__((always_inline)) Particles(const SweepData<D, P>& s,
                                                   const std::int32_t* index) {
 #ifdef __AVX512F__
-    static_cast<void>(firsts), static_cast<void>(seconds);
     Lane<Real> number[record_length];
     gather_records(s.records[0].number, index, number);
     for (int c = 0; c < D; ++c) {
       if constexpr (record_velocity<D, P> == 0)
-        x[c] = gather(s.position, index, D, c);
+        x[c] = gather(s.place_position, index, D, c);
       else
         x[c] = number[c];
       v[c] = number[record_velocity<D, P> + std::size_t(c)];
@@ -88,11 +86,11 @@ struct Particles {
     second = number[record_first<D, P> + 1];
 #else
     for (int c = 0; c < D; ++c) {
-      x[c] = gather(s.position, index, D, c);
-      v[c] = gather(s.velocity, index, D, c);
+      x[c] = gather(s.place_position, index, D, c);
+      v[c] = gather(s.place_velocity, index, D, c);
     }
-    first = gather(firsts, index, 1, 0);
-    second = gather(seconds, index, 1, 0);
+    first = gather(s.first, index, 1, 0);
+    second = gather(s.second, index, 1, 0);
 #endif
   }
 };
@@ -135,11 +133,23 @@ struct Separation {
   }
 };
 
-/// Loads eight consecutive particles; lanes past the end repeat the last one and are not stored.
-struct OwnIndex {
+/// The indices of the particles at eight places.
+struct Indices {
+  std::int32_t index[lanes];
+  inline __attribute__((always_inline)) Indices(const std::int32_t* order,
+                                                const std::int32_t* place) {
+    if (order)
+      for (std::size_t l = 0; l < lanes; ++l) index[l] = order[place[l]];
+    else
+      __builtin_memcpy(index, place, sizeof index);
+  }
+};
+
+/// Eight consecutive places; lanes past the end repeat the last one and are not stored.
+struct OwnPlaces {
   std::int32_t index[lanes];
   std::size_t used;
-  OwnIndex(std::size_t group, std::size_t count) {
+  OwnPlaces(std::size_t group, std::size_t count) {
     const std::size_t first = group * lanes;
     used = count - first < lanes ? count - first : lanes;
     for (std::size_t l = 0; l < lanes; ++l)

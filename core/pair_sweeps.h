@@ -57,12 +57,15 @@ struct SweepData {
   const Real* mass = nullptr;             // [kg]
   const Real* superficial_density = nullptr;  // rhob(n)
   const Real* porosity = nullptr;         // floored; nullptr: 1 everywhere
-  const Real* volume_before = nullptr;    // m / rhob(n)
-  const Real* density_before = nullptr;   // rho(n) = rhob / eps
-  /// The same once more, where `reads_records`. The two numbers are density_before and
-  /// volume_before for `density`, push and volume for `stress`.
+  /// Lists name particles by their places, which may be in another order than their indices
+  /// (core/fluid_lists.h): the index at each place, or nullptr where they are the same.
+  const std::int32_t* order = nullptr;
+  /// What pairs read of each other, by place, in records where `reads_records`. The two numbers
+  /// are rho(n) = rhob / eps and V(n) = m / rhob for `density`, push and volume for `stress`.
   const PairRecord<Real>* records = nullptr;
-  GroupedLists fluid, walls;              // of fluid particles: fluid and dummy candidates
+  const Position* place_position = nullptr;
+  const Real *place_velocity = nullptr, *first = nullptr, *second = nullptr;
+  GroupedLists fluid, walls;              // of fluid by place: places and dummies as candidates
   GroupedLists of_walls;                  // of dummies: fluid candidates
 
   std::size_t wall_count = 0;
@@ -71,15 +74,18 @@ struct SweepData {
   const Real* wall_volume = nullptr;        // [m3] dx^D; the padding point has 0
   const Real* wall_viscous_volume = nullptr;  // the same where no slip holds, else 0
 
-  Real* superficial_density_next = nullptr;  // rhob(n+1)
-  Real* volume = nullptr;                    // m / rhob(n+1)
-  Real* pressure = nullptr;                  // [Pa]
+  // What the density sweep finds, by place, and by index what others read of it.
+  Real *density_out = nullptr, *volume_out = nullptr;
+  Real *pressure_out = nullptr, *push_out = nullptr;  // the same numbers
+  const Real* superficial_density_next = nullptr;  // rhob(n+1)
+  const Real* volume = nullptr;                    // m / rhob(n+1)
+  const Real* pressure = nullptr;                  // [Pa]
   Real* wall_push = nullptr;                 // [Pa] `push` extrapolated
   Real* wall_velocity = nullptr;             // for viscosity: 2 v_wall - extrapolated
-  Real* push = nullptr;  // [Pa] what pairs push each other with: p, unless `conjugate`
-  Real* stress_force = nullptr;  // [N] pressure and viscous force on a particle
+  const Real* push = nullptr;  // [Pa] what pairs push each other with: p, unless `conjugate`
+  Real* stress_force = nullptr;  // [N] pressure and viscous force on a particle, by place
   Real* viscous_force = nullptr;  // [N] the viscous part of it; only where `conjugate`
-  Real* gradient_correction = nullptr;  // [-] symmetric_numbers<D> a particle; where `corrected`
+  Real* gradient_correction = nullptr;  // [-] symmetric_numbers<D> a place; where `corrected`
   Real* shift_velocity = nullptr;       // [m/s] with which a particle moves beside its own
 
   Real smoothing_length = 0, dt = 0, reference_density = 0, sound_speed = 0, viscosity = 0;

@@ -29,8 +29,9 @@ void density_loop(const SweepData<D, P>& s, std::size_t group_begin, std::size_t
   const Real diffusion = Real(2) * s.diffusion * s.smoothing_length * s.sound_speed;
   const Real stiffness = s.sound_speed * s.sound_speed;
   for (std::size_t g = group_begin; g < group_end; ++g) {
-    const OwnIndex own(g, s.count);
-    const Particles<D, P> here(s, s.density_before, s.volume_before, own.index);
+    const OwnPlaces own(g, s.count);
+    const Indices id(s.order, own.index);
+    const Particles<D, P> here(s, own.index);
     Lane<Real> divergence{}, spread{};
     Separation<D, P> pair;
     CorrectedGradients<D, Real> gradients;
@@ -45,7 +46,7 @@ void density_loop(const SweepData<D, P>& s, std::size_t group_begin, std::size_t
     };
     for (std::uint32_t k = s.fluid.start[g]; k < s.fluid.start[g + 1]; ++k) {
       const std::int32_t* j = s.fluid.index + std::size_t(k) * lanes;
-      const Particles<D, P> there(s, s.density_before, s.volume_before, j);
+      const Particles<D, P> there(s, j);
       pair.template set<periodic>(here.x, there.x, s.period, inverse_h);
       Lane<Real> dv[D], drop = here.first - there.first;
       for (int c = 0; c < D; ++c) {
@@ -64,17 +65,18 @@ void density_loop(const SweepData<D, P>& s, std::size_t group_begin, std::size_t
       add(gather(s.wall_volume, j, 1, 0) * kernel_slope<K, Real>(pair.q), dv);
     }
     for (std::size_t l = 0; l < own.used; ++l) {
-      const std::size_t i = g * lanes + l;
+      const std::size_t place = g * lanes + l;
+      const auto i = std::size_t(id.index[l]);
       const Real eps = s.porosity ? s.porosity[i] : Real(1);
       const Real rhob = s.superficial_density[i];
       if constexpr (corrected)
         divergence[l] = gradients.divergence(
-            l, slope_scale, s.gradient_correction + i * std::size_t(symmetric_numbers<D>));
+            l, slope_scale, s.gradient_correction + place * std::size_t(symmetric_numbers<D>));
       const Real rate =
           slope_scale * (rhob * divergence[l] + eps * diffusion * spread[l]);
       const Real next = rhob + s.dt * rate;
-      s.superficial_density_next[i] = next;
-      s.volume[i] = s.mass[i] / next;
+      s.density_out[place] = next;
+      s.volume_out[place] = s.mass[i] / next;
       Real pressure;
       if (s.tait_pressure > Real(0)) {
         const Real ratio = next / eps / s.reference_density, cube = ratio * ratio * ratio;
@@ -82,8 +84,8 @@ void density_loop(const SweepData<D, P>& s, std::size_t group_begin, std::size_t
       } else {
         pressure = stiffness * (next / eps - s.reference_density);
       }
-      s.pressure[i] = pressure;
-      s.push[i] = pressure;
+      s.pressure_out[place] = pressure;
+      s.push_out[place] = pressure;
     }
   }
 }
@@ -101,7 +103,7 @@ void extrapolate_loop(const SweepData<D, P>& s, std::size_t group_begin, std::si
   const Real inverse_h = Real(1) / s.smoothing_length;
   const Real stiffness = s.sound_speed * s.sound_speed;
   for (std::size_t g = group_begin; g < group_end; ++g) {
-    const OwnIndex own(g, s.wall_count);
+    const OwnPlaces own(g, s.wall_count);
     Lane<Position> x[D];
     for (int c = 0; c < D; ++c) x[c] = gather(s.wall_position, own.index, D, c);
     Lane<Real> weights{}, pressures{}, velocities[D] = {};
@@ -156,8 +158,8 @@ void stress_loop(const SweepData<D, P>& s, std::size_t group_begin, std::size_t 
   const Real viscous = Real(2) * s.viscosity;
   constexpr bool conjugate = sum == PressureSum::conjugate;
   for (std::size_t g = group_begin; g < group_end; ++g) {
-    const OwnIndex own(g, s.count);
-    const Particles<D, P> here(s, s.push, s.volume, own.index);
+    const OwnPlaces own(g, s.count);
+    const Particles<D, P> here(s, own.index);
     Lane<Real> force[D] = {}, shear[D] = {};
     const auto add = [&](Lane<Real> push, Lane<Real> drag, int c, Lane<Real> other) {
       if constexpr (conjugate) {
@@ -174,7 +176,7 @@ void stress_loop(const SweepData<D, P>& s, std::size_t group_begin, std::size_t 
       gather_corrections<D, Real>(s.gradient_correction, own.index, own_correction);
     for (std::uint32_t k = s.fluid.start[g]; k < s.fluid.start[g + 1]; ++k) {
       const std::int32_t* j = s.fluid.index + std::size_t(k) * lanes;
-      const Particles<D, P> there(s, s.push, s.volume, j);
+      const Particles<D, P> there(s, j);
       pair.template set<periodic>(here.x, there.x, s.period, inverse_h);
       const Lane<Real> weight = there.second * kernel_slope<K, Real>(pair.q);
       const Lane<Real> push = -(here.first + there.first) * weight;
@@ -211,12 +213,12 @@ void stress_loop(const SweepData<D, P>& s, std::size_t group_begin, std::size_t 
       const std::size_t i = g * lanes + l;
       for (int c = 0; c < D; ++c)
         if constexpr (conjugate) {
-          const Real viscous_part = slope_scale * s.volume[i] * shear[c][l];
+          const Real viscous_part = slope_scale * here.second[l] * shear[c][l];
           s.viscous_force[i * D + std::size_t(c)] = viscous_part;
           s.stress_force[i * D + std::size_t(c)] =
-              slope_scale * s.volume[i] * force[c][l] + viscous_part;
+              slope_scale * here.second[l] * force[c][l] + viscous_part;
         } else {
-          s.stress_force[i * D + std::size_t(c)] = slope_scale * s.volume[i] * force[c][l];
+          s.stress_force[i * D + std::size_t(c)] = slope_scale * here.second[l] * force[c][l];
         }
     }
   }
@@ -236,14 +238,15 @@ void artificial_loop(const SweepData<D, P>& s, std::size_t group_begin, std::siz
       normalisation<K, D, Real>() / power_of_length<D>(h) * inverse_h * inverse_h;
   const Real soft = Real(0.01) * h * h, linear = s.artificial_alpha * s.sound_speed;
   for (std::size_t g = group_begin; g < group_end; ++g) {
-    const OwnIndex own(g, s.count);
+    const OwnPlaces own(g, s.count);
+    const Indices id(s.order, own.index);
     Lane<Position> x[D];
     Lane<Real> v[D], force[D] = {}, other_v[D];
     for (int c = 0; c < D; ++c) {
-      x[c] = gather(s.position, own.index, D, c);
-      v[c] = gather(s.velocity, own.index, D, c);
+      x[c] = gather(s.position, id.index, D, c);
+      v[c] = gather(s.velocity, id.index, D, c);
     }
-    const Lane<Real> rhob = gather<Real>(s.superficial_density_next, own.index, 1, 0);
+    const Lane<Real> rhob = gather<Real>(s.superficial_density_next, id.index, 1, 0);
     Separation<D, P> pair;
     const auto add = [&](Lane<Real> volume, Lane<Real> other_rhob) {
       Lane<Real> approach{};
@@ -257,7 +260,8 @@ void artificial_loop(const SweepData<D, P>& s, std::size_t group_begin, std::siz
       for (int c = 0; c < D; ++c) force[c] += push * pair.d[c];
     };
     for (std::uint32_t k = s.fluid.start[g]; k < s.fluid.start[g + 1]; ++k) {
-      const std::int32_t* j = s.fluid.index + std::size_t(k) * lanes;
+      const Indices there(s.order, s.fluid.index + std::size_t(k) * lanes);
+      const std::int32_t* j = there.index;
       pair.template set<periodic>(x, s.position, j, s.period, inverse_h);
       for (int c = 0; c < D; ++c) other_v[c] = gather(s.velocity, j, D, c);
       add(gather<Real>(s.volume, j, 1, 0), gather<Real>(s.superficial_density_next, j, 1, 0));
@@ -271,7 +275,7 @@ void artificial_loop(const SweepData<D, P>& s, std::size_t group_begin, std::siz
     for (std::size_t l = 0; l < own.used; ++l) {
       const std::size_t i = g * lanes + l;
       for (int c = 0; c < D; ++c) {
-        const Real each = slope_scale * s.volume[i] * force[c][l];
+        const Real each = slope_scale * s.volume[id.index[l]] * force[c][l];
         s.stress_force[i * D + std::size_t(c)] += each;
         if (s.conjugate) s.viscous_force[i * D + std::size_t(c)] += each;
       }

@@ -95,13 +95,15 @@ void shift_loop(const SweepData<D, P>& s, std::size_t group_begin, std::size_t g
                      power_of_length<D>(h) * inverse_h * inverse_h;
   const Real most = Real(0.5) * s.shifting_speed;
   for (std::size_t g = group_begin; g < group_end; ++g) {
-    const OwnIndex own(g, s.count);
+    const OwnPlaces own(g, s.count);
+    const Indices id(s.order, own.index);
     Lane<Position> x[D];
     Lane<Real> uneven[D] = {};
-    for (int c = 0; c < D; ++c) x[c] = gather(s.position, own.index, D, c);
+    for (int c = 0; c < D; ++c) x[c] = gather(s.position, id.index, D, c);
     Separation<D, P> pair;
     for (std::uint32_t k = s.fluid.start[g]; k < s.fluid.start[g + 1]; ++k) {
-      const std::int32_t* j = s.fluid.index + std::size_t(k) * lanes;
+      const Indices there(s.order, s.fluid.index + std::size_t(k) * lanes);
+      const std::int32_t* j = there.index;
       pair.template set<periodic>(x, s.position, j, s.period, inverse_h);
       const Lane<Real> slope = gather<Real>(s.volume, j, 1, 0) * kernel_slope<K, Real>(pair.q);
       for (int c = 0; c < D; ++c) uneven[c] += slope * pair.d[c];
@@ -115,7 +117,7 @@ void shift_loop(const SweepData<D, P>& s, std::size_t group_begin, std::size_t g
     for (std::size_t l = 0; l < own.used; ++l)
       for (int c = 0; c < D; ++c) {
         const Real u = scale * uneven[c][l];
-        s.shift_velocity[(g * lanes + l) * D + std::size_t(c)] =
+        s.shift_velocity[std::size_t(id.index[l]) * D + std::size_t(c)] =
             u > most ? most : u < -most ? -most : u;
       }
   }

@@ -101,7 +101,8 @@ struct RunOptions {
   unsigned threads = 1;
   /// Tests only: every thread does its own share (core/workers.h), so that each is known to work.
   bool own_parts_only = false;
-  /// Tests only: rebuild neighbour lists at pseudo-random steps chosen by this seed too.
+  /// Tests only: rebuild neighbour lists at pseudo-random steps chosen by this seed too, half the
+  /// times in the order of cells.
   std::uint64_t rebuild_seed = 0;
   /// Tests only: 0 baseline, 1 x86-64-v3, 2 x86-64-v4; -1 the widest that the processor has.
   int instruction_set = -1;

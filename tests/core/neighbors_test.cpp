@@ -245,24 +245,95 @@ TEST(FluidLists, AreStaleOnceAPointMovedByHalfTheSkinOrTheNumberChanged) {
   FluidLists<2, double> lists;
   const double skin = 0.02;
   EXPECT_TRUE(lists.stale(points, skin, workers));
-  lists.rebuild(points, walls, 0.2, skin, {}, workers);
+  lists.rebuild(points, walls, 0.2, skin, {}, false, workers);
   EXPECT_FALSE(lists.stale(points, skin, workers));
   points[31][1] += 0.49 * skin;
   EXPECT_FALSE(lists.stale(points, skin, workers));
   points[31][1] += 0.02 * skin;
   EXPECT_TRUE(lists.stale(points, skin, workers));
-  lists.rebuild(points, walls, 0.2, skin, {}, workers);
+  lists.rebuild(points, walls, 0.2, skin, {}, false, workers);
   EXPECT_FALSE(lists.stale(points, skin, workers));
   points[3][0] = std::numeric_limits<double>::quiet_NaN();
   EXPECT_TRUE(lists.stale(points, skin, workers));
   points[3][0] = 0.5;
-  lists.rebuild(points, walls, 0.2, skin, {}, workers);
+  lists.rebuild(points, walls, 0.2, skin, {}, false, workers);
   points.pop_back();
   EXPECT_TRUE(lists.stale(points, skin, workers));
   points.push_back({0.1, 0.1});
-  lists.rebuild(points, walls, 0.2, skin, {}, workers);
+  lists.rebuild(points, walls, 0.2, skin, {}, false, workers);
   lists.reset();
   EXPECT_TRUE(lists.stale(points, skin, workers));
+}
+
+/// The candidates of each point by index, from lists by place; those of the filler left out.
+template <int D>
+std::vector<std::vector<std::int32_t>> by_index(const FluidLists<D, double>& lists,
+                                                std::size_t count) {
+  std::vector<std::vector<std::int32_t>> rows(count);
+  const GroupedLists fluid = lists.fluid();
+  for (std::size_t a = 0; a < count; ++a) {
+    const std::size_t place = lists.place_of(a), g = place / lanes, l = place % lanes;
+    EXPECT_EQ(lists.index_at(static_cast<std::int32_t>(place)), a);
+    for (std::uint32_t k = fluid.start[g]; k < fluid.start[g + 1]; ++k) {
+      const std::int32_t other = fluid.index[std::size_t(k) * lanes + l];
+      if (static_cast<std::size_t>(other) != place)
+        rows[a].push_back(static_cast<std::int32_t>(lists.index_at(other)));
+    }
+  }
+  return rows;
+}
+
+TEST(FluidLists, HoldTheSameInTheSameOrderOfIndicesInEitherOrderOfPlaces) {
+  for (const unsigned threads : {1u, 3u}) {
+    Workers workers(threads);
+    const auto points = random_points<2, double>(700, 1.0, 5);
+    const Points<2, double> walls{{0.5, -0.05}, {0.2, 1.02}};
+    FluidLists<2, double> plain, ordered;
+    plain.rebuild(points, walls, 0.1, 0.02, {}, false, workers);
+    ordered.rebuild(points, walls, 0.1, 0.02, {}, true, workers);
+    EXPECT_FALSE(plain.ordered());
+    ASSERT_TRUE(ordered.ordered());
+    EXPECT_EQ(by_index(plain, 700), by_index(ordered, 700));
+    EXPECT_EQ(by_index(plain, 700),
+              (brute_force<2, double>(points, points, 0.12, Periodicity<2>{}, true)));
+    // Of dummies and, by place, beside them.
+    for (std::size_t w = 0; w < walls.size(); ++w)
+      EXPECT_THAT(ordered.fluid_near_wall(w), testing::ElementsAreArray(plain.fluid_near_wall(w)));
+    std::vector<std::vector<bool>> near(2, std::vector<bool>(700 * walls.size(), false));
+    for (const FluidLists<2, double>* lists : {&plain, &ordered})
+      for (std::size_t place = 0; place < 700; ++place) {
+        const GroupedLists beside = lists->walls();
+        const std::size_t g = place / lanes;
+        for (std::uint32_t k = beside.start[g]; k < beside.start[g + 1]; ++k) {
+          const std::int32_t w = beside.index[std::size_t(k) * lanes + place % lanes];
+          if (static_cast<std::size_t>(w) < walls.size())
+            near[lists == &plain ? 0 : 1][lists->index_at(static_cast<std::int32_t>(place)) *
+                                              walls.size() +
+                                          static_cast<std::size_t>(w)] = true;
+        }
+      }
+    EXPECT_EQ(near[0], near[1]);
+    EXPECT_THAT(near[0], testing::Contains(true));
+  }
+}
+
+TEST(FluidLists, AreOrderedOnceNeighboursAreScatteredOverTheMemory) {
+  Workers workers(2);
+  const Points<2, double> walls;
+  // 20,000 points of a lattice, row by row, and the same stirred.
+  Points<2, double> lattice, stirred;
+  for (std::size_t i = 0; i < 20000; ++i)
+    lattice.push_back({0.01 * static_cast<double>(i % 200), 0.01 * static_cast<double>(i / 200)});
+  stirred = lattice;
+  for (std::size_t i = stirred.size(); i-- > 1;)
+    std::swap(stirred[i], stirred[random_bits(3, i, 0) % (i + 1)]);
+  FluidLists<2, double> lists;
+  lists.rebuild(lattice, walls, 0.025, 0.003, {}, false, workers);
+  EXPECT_FALSE(lists.ordered());
+  lists.rebuild(stirred, walls, 0.025, 0.003, {}, false, workers);
+  EXPECT_TRUE(lists.ordered());
+  lists.rebuild(lattice, walls, 0.025, 0.003, {}, false, workers);
+  EXPECT_FALSE(lists.ordered());
 }
 
 }  // namespace
