@@ -185,6 +185,11 @@ std::vector<ValidationRow> wall_forces() {
                               d.walls_on_fluid + d.walls_on_grains, 0.02, gained(d)));
   rows.push_back(relative_row("full pressure, resting: walls on the fluid", "N/m", d.fluid_weight,
                               d.walls_on_fluid, 0.02));
+  core::Scenario averaging = lying(full);
+  averaging.coupling.pressure_force = core::PressureForce::averaged;
+  const Carried e = carried(averaging, 0.4, 0.6);
+  rows.push_back(relative_row("full pressure, averaged form: floor on the grains", "N/m",
+                              e.submerged, e.walls_on_grains, 0.02));
   ValidationRow floor = relative_row("full pressure, resting: floor on the grains", "N/m",
                                      d.submerged, d.walls_on_grains, 0.02);
   floor.excuse =
