@@ -12,6 +12,5 @@
 #include "core/engine_balance_impl.h"
 #include "core/engine_change_impl.h"
 #include "core/engine_fields_impl.h"
-#include "core/engine_places_impl.h"
 #include "core/engine_report_impl.h"
 #include "core/engine_stages_impl.h"

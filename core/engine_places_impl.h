@@ -6,6 +6,13 @@
 
 namespace varve::core {
 
+namespace engine_detail {
+
+/// Items of a loop of few instructions below which a second thread is not worth waking.
+inline constexpr std::size_t cheap_items = 2048;
+
+}  // namespace engine_detail
+
 template <int D, class P>
 SweepData<D, P> Engine<D, P>::sweep_data() {
   SweepData<D, P> s;

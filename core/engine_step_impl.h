@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "core/engine.h"
+#include "core/engine_places_impl.h"
 
 namespace varve::core {
 
@@ -23,9 +24,6 @@ inline constexpr const char* pass_names[pass_count] = {
 /// The skin of the lists over the smoothing length: small enough for short lists, large enough that
 /// they live for several steps at CFL 0.25. It reaches no bit.
 inline constexpr double skin_ratio = 0.25;
-
-/// Items of a loop of few instructions below which a second thread is not worth waking.
-inline constexpr std::size_t cheap_items = 2048;
 
 inline constexpr std::size_t nobody = std::numeric_limits<std::size_t>::max();
 
