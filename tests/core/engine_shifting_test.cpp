@@ -104,18 +104,6 @@ TEST(EngineShifting, WallsTakeWhatTheFluidGives) {
   }
 }
 
-/// The shortest distance between two particles, over the spacing.
-double closest(const Simulation& simulation) {
-  const std::vector<double> x = field(simulation, "fluid.position");
-  double least = 1e300;
-  for (std::size_t a = 0; a < x.size(); a += 2)
-    for (std::size_t b = a + 2; b < x.size(); b += 2) {
-      const double dx = x[a] - x[b], dy = x[a + 1] - x[b + 1];
-      least = std::min(least, dx * dx + dy * dy);
-    }
-  return std::sqrt(least) / simulation.scenario().fluid.spacing;
-}
-
 TEST(EngineShifting, ParticlesSpreadEvenlyWithoutAnyFlow) {
   const auto shifted = started(jittered_box(2, 1)), plain = started(jittered_box(2, 0));
   ASSERT_LT(closest(*shifted), 0.7);

@@ -1,9 +1,11 @@
 // What the tests of the whole engine share: scenes, states as bytes, digests, checks on the ledger.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <memory>
 #include <ostream>
 #include <stdexcept>
@@ -120,6 +122,18 @@ void set_field(Simulation& simulation, const std::string& name, const std::vecto
   if (state.bytes[k].size() != values.size() * sizeof(T)) throw std::length_error(name);
   std::memcpy(state.bytes[k].data(), values.data(), state.bytes[k].size());
   simulation.set_state(state.spans());
+}
+
+/// Least distance between two fluid particles of a plane, in spacings.
+inline double closest(const Simulation& simulation) {
+  const std::vector<double> x = field(simulation, "fluid.position");
+  double least = std::numeric_limits<double>::max();
+  for (std::size_t a = 0; a < x.size(); a += 2)
+    for (std::size_t b = a + 2; b < x.size(); b += 2) {
+      const double dx = x[a] - x[b], dy = x[a + 1] - x[b + 1];
+      least = std::min(least, dx * dx + dy * dy);
+    }
+  return std::sqrt(least) / simulation.scenario().fluid.spacing;
 }
 
 // ---- digests, by the code that a log's digests come from ----

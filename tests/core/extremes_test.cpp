@@ -274,18 +274,6 @@ TEST(Extremes, X21InAPipeNarrowerThanTheCouplingNothingOfTheBalanceIsLost) {
   }
 }
 
-/// Least distance between two fluid particles, in spacings.
-double closest(const Simulation& simulation) {
-  const std::vector<double> x = field(simulation, "fluid.position");
-  double least = 1;
-  for (std::size_t a = 0; a < x.size(); a += 2)
-    for (std::size_t b = a + 2; b < x.size(); b += 2) {
-      const double dx = x[a] - x[b], dy = x[a + 1] - x[b + 1];
-      least = std::min(least, dx * dx + dy * dy);
-    }
-  return std::sqrt(least) / simulation.scenario().fluid.spacing;
-}
-
 TEST(Extremes, X22BehindAFastGrainFluidDoesNotPairUp) {
   Scenario s = single_disc();
   s.grains.density = 2500;
