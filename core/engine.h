@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -98,10 +99,9 @@ class Engine final : public Simulation {
   void find_porosity();
   void prepare_fluid();
   void find_density_and_pressure();
+  void sweep(typename PairSweeps<D, P>::Loop loop, std::size_t points);
   template <class Body>
-  void for_each_place(const Body& body);
-  template <class Body>
-  void for_each_index(const Body& body);
+  void for_each_mapped(std::span<const std::int32_t> map, const Body& body);
   void list_places();
   void list_numbers(const std::vector<Real>& first, const std::vector<Real>& second);
   void find_wall_values();

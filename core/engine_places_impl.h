@@ -79,28 +79,24 @@ SweepData<D, P> Engine<D, P>::sweep_data() {
   return s;
 }
 
-/// Calls `body(place, index)` for every particle, in the order of places. Stores then follow each
-/// other and what is scattered is loads: a processor has many of these under way at once.
+/// Runs one loop of the pair sweeps over `points` places or dummies.
 template <int D, class P>
-template <class Body>
-void Engine<D, P>::for_each_place(const Body& body) {
-  const std::span<const std::int32_t> order = lists_.order();
-  workers_.run(state_.fluid.size(), engine_detail::cheap_items,
-               [&](std::size_t begin, std::size_t end, unsigned) {
-                 for (std::size_t place = begin; place < end; ++place)
-                   body(place, order.empty() ? place : static_cast<std::size_t>(order[place]));
-               });
+void Engine<D, P>::sweep(typename PairSweeps<D, P>::Loop loop, std::size_t points) {
+  const SweepData<D, P> data = sweep_data();
+  workers_.run((points + lanes - 1) / lanes, 4,
+               [&](std::size_t begin, std::size_t end, unsigned) { loop(data, begin, end); });
 }
 
-/// Calls `body(index, place)` for every particle, in the order of indices.
+/// Calls `body(k, map[k])` for every particle, `map` being the order of the lists or their places;
+/// an empty one is k itself. Stores at k then follow each other and what is scattered is loads: a
+/// processor has many of these under way at once.
 template <int D, class P>
 template <class Body>
-void Engine<D, P>::for_each_index(const Body& body) {
-  const std::span<const std::int32_t> places = lists_.places();
+void Engine<D, P>::for_each_mapped(std::span<const std::int32_t> map, const Body& body) {
   workers_.run(state_.fluid.size(), engine_detail::cheap_items,
                [&](std::size_t begin, std::size_t end, unsigned) {
-                 for (std::size_t a = begin; a < end; ++a)
-                   body(a, static_cast<std::size_t>(places[a]));
+                 for (std::size_t k = begin; k < end; ++k)
+                   body(k, map.empty() ? k : static_cast<std::size_t>(map[k]));
                });
 }
 
@@ -116,7 +112,7 @@ void Engine<D, P>::list_places() {
   if (positions) work_.place_position.resize(n);
   if (velocities) work_.place_velocity.resize(n);
   if (!records && !positions) return;
-  for_each_place([&](std::size_t place, std::size_t a) {
+  for_each_mapped(lists_.order(), [&](std::size_t place, std::size_t a) {
     if (positions) work_.place_position[place] = state_.fluid.position[a];
     if (velocities) work_.place_velocity[place] = state_.fluid.velocity[a];
     if (!records) return;
@@ -134,7 +130,7 @@ void Engine<D, P>::list_numbers(const std::vector<Real>& first, const std::vecto
   work_.first = first.data();
   work_.second = second.data();
   if (sweeps_.reads_records) {
-    for_each_place([&](std::size_t place, std::size_t a) {
+    for_each_mapped(lists_.order(), [&](std::size_t place, std::size_t a) {
       work_.records[place].number[record_first<D, P>] = first[a];
       work_.records[place].number[record_first<D, P> + 1] = second[a];
     });
@@ -143,7 +139,7 @@ void Engine<D, P>::list_numbers(const std::vector<Real>& first, const std::vecto
     work_.place_second.resize(first.size());
     work_.first = work_.place_first.data();
     work_.second = work_.place_second.data();
-    for_each_place([&](std::size_t place, std::size_t a) {
+    for_each_mapped(lists_.order(), [&](std::size_t place, std::size_t a) {
       work_.place_first[place] = first[a];
       work_.place_second[place] = second[a];
     });

@@ -146,13 +146,9 @@ void Engine<D, P>::find_density_and_pressure() {
   }
   list_places();
   list_numbers(work_.density_before, work_.volume_before);
-  const SweepData<D, P> data = sweep_data();
-  workers_.run((data.count + lanes - 1) / lanes, 4,
-               [&](std::size_t begin, std::size_t end, unsigned) {
-                 sweeps_.density(data, begin, end);
-               });
+  sweep(sweeps_.density, state_.fluid.size());
   if (lists_.ordered())
-    for_each_index([&](std::size_t a, std::size_t place) {
+    for_each_mapped(lists_.places(), [&](std::size_t a, std::size_t place) {
       next_.fluid.superficial_density[a] = work_.place_density[place];
       work_.volume[a] = work_.place_volume[place];
       work_.pressure[a] = work_.push[a] = work_.place_pressure[place];
@@ -166,11 +162,7 @@ void Engine<D, P>::find_density_and_pressure() {
 
 template <int D, class P>
 void Engine<D, P>::find_wall_values() {
-  const SweepData<D, P> data = sweep_data();
-  workers_.run((data.wall_count + lanes - 1) / lanes, 4,
-               [&](std::size_t begin, std::size_t end, unsigned) {
-                 sweeps_.extrapolate(data, begin, end);
-               });
+  sweep(sweeps_.extrapolate, work_.wall_count);
   digest_stage(Stage::walls);
   count_pass(engine_detail::pass_walls);
 }
@@ -178,15 +170,11 @@ void Engine<D, P>::find_wall_values() {
 template <int D, class P>
 void Engine<D, P>::find_stresses() {
   list_numbers(work_.push, work_.volume);
-  const SweepData<D, P> data = sweep_data();
-  workers_.run((data.count + lanes - 1) / lanes, 4,
-               [&](std::size_t begin, std::size_t end, unsigned) {
-                 sweeps_.stress(data, begin, end);
-               });
+  sweep(sweeps_.stress, state_.fluid.size());
   count_pass(engine_detail::pass_stress);
   if (c_.artificial_alpha > 0 || c_.artificial_beta > 0) add_artificial_viscosity();
   if (lists_.ordered())
-    for_each_index([&](std::size_t a, std::size_t place) {
+    for_each_mapped(lists_.places(), [&](std::size_t a, std::size_t place) {
       work_.stress_force[a] = work_.place_stress[place];
       if (c_.conjugate_pressure) work_.viscous_force[a] = work_.place_viscous[place];
     });
@@ -196,21 +184,13 @@ void Engine<D, P>::find_stresses() {
 
 template <int D, class P>
 void Engine<D, P>::find_shifts() {
-  const SweepData<D, P> data = sweep_data();
-  workers_.run((data.count + lanes - 1) / lanes, 4,
-               [&](std::size_t begin, std::size_t end, unsigned) {
-                 sweeps_.shift(data, begin, end);
-               });
+  sweep(sweeps_.shift, state_.fluid.size());
   count_pass(engine_detail::pass_shift);
 }
 
 template <int D, class P>
 void Engine<D, P>::add_artificial_viscosity() {
-  const SweepData<D, P> data = sweep_data();
-  workers_.run((data.count + lanes - 1) / lanes, 4,
-               [&](std::size_t begin, std::size_t end, unsigned) {
-                 sweeps_.artificial(data, begin, end);
-               });
+  sweep(sweeps_.artificial, state_.fluid.size());
   count_pass(engine_detail::pass_artificial);
 }
 
